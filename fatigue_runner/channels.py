@@ -1,0 +1,82 @@
+"""The names, units and labels of states, wind signals and load channels, as used in tables, logs and API.
+
+Moments are about the blade-root and tower-base axes as OpenFAST's RootMyb/RootMxb and TwrBsMyt/TwrBsMxt, signs included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One signal: its name everywhere, its SI unit, and how a person reads it (value * `scale` in `read_unit`)."""
+
+    name: str
+    unit: str
+    label: str
+    read_unit: str
+    scale: float = 1.0
+
+
+STATES = (
+    Channel("tower_fore_aft", "m", "tower-top fore-aft", "m"),
+    Channel("tower_side_side", "m", "tower-top side-side", "m"),
+    Channel("blade1_flap", "m", "blade 1 flap", "m"),
+    Channel("blade2_flap", "m", "blade 2 flap", "m"),
+    Channel("blade3_flap", "m", "blade 3 flap", "m"),
+    Channel("edge", "m", "collective edge", "m"),
+    Channel("rotor_azimuth", "rad", "rotor azimuth", "deg", 57.29577951308232),
+    Channel("generator_azimuth", "rad", "generator azimuth (high-speed side)", "deg", 57.29577951308232),
+    Channel("tower_fore_aft_velocity", "m/s", "tower-top fore-aft velocity", "m/s"),
+    Channel("tower_side_side_velocity", "m/s", "tower-top side-side velocity", "m/s"),
+    Channel("blade1_flap_velocity", "m/s", "blade 1 flap velocity", "m/s"),
+    Channel("blade2_flap_velocity", "m/s", "blade 2 flap velocity", "m/s"),
+    Channel("blade3_flap_velocity", "m/s", "blade 3 flap velocity", "m/s"),
+    Channel("edge_velocity", "m/s", "collective edge velocity", "m/s"),
+    Channel("rotor_speed", "rad/s", "rotor speed", "rpm", 9.549296585513721),
+    Channel("generator_speed", "rad/s", "generator speed", "rpm", 9.549296585513721),
+)
+
+# The list is open at its end: rotationally sampled turbulence adds the higher azimuthal harmonics there.
+WIND_SIGNALS = (
+    Channel("wind_speed", "m/s", "hub-height wind speed", "m/s"),
+    Channel("vertical_shear", "-", "linear vertical shear", "-"),
+    Channel("horizontal_shear", "-", "linear horizontal shear", "-"),
+)
+
+LOADS = (
+    Channel("tower_base_fore_aft_moment", "N.m", "tower-base fore-aft moment", "kN·m", 1e-3),
+    Channel("tower_base_side_side_moment", "N.m", "tower-base side-side moment", "kN·m", 1e-3),
+    Channel("blade1_root_flapwise_moment", "N.m", "blade 1 root flapwise moment", "kN·m", 1e-3),
+    Channel("blade2_root_flapwise_moment", "N.m", "blade 2 root flapwise moment", "kN·m", 1e-3),
+    Channel("blade3_root_flapwise_moment", "N.m", "blade 3 root flapwise moment", "kN·m", 1e-3),
+    Channel("blade1_root_edgewise_moment", "N.m", "blade 1 root edgewise moment", "kN·m", 1e-3),
+    Channel("blade2_root_edgewise_moment", "N.m", "blade 2 root edgewise moment", "kN·m", 1e-3),
+    Channel("blade3_root_edgewise_moment", "N.m", "blade 3 root edgewise moment", "kN·m", 1e-3),
+    Channel("low_speed_shaft_torque", "N.m", "low-speed shaft torque", "kN·m", 1e-3),
+    Channel("rotor_thrust", "N", "rotor thrust (aerodynamic)", "kN", 1e-3),
+    Channel("generator_torque", "N.m", "generator torque (high-speed side)", "kN·m", 1e-3),
+    Channel("blade1_tip_out_of_plane", "m", "blade 1 tip out-of-plane deflection", "m"),
+    Channel("blade2_tip_out_of_plane", "m", "blade 2 tip out-of-plane deflection", "m"),
+    Channel("blade3_tip_out_of_plane", "m", "blade 3 tip out-of-plane deflection", "m"),
+    Channel("blade1_tip_in_plane", "m", "blade 1 tip in-plane deflection", "m"),
+    Channel("blade2_tip_in_plane", "m", "blade 2 tip in-plane deflection", "m"),
+    Channel("blade3_tip_in_plane", "m", "blade 3 tip in-plane deflection", "m"),
+    Channel("tower_top_fore_aft_acceleration", "m/s2", "tower-top fore-aft acceleration", "m/s²"),
+    Channel("tower_top_side_side_acceleration", "m/s2", "tower-top side-side acceleration", "m/s²"),
+)
+
+STATE_NAMES = tuple(c.name for c in STATES)
+WIND_NAMES = tuple(c.name for c in WIND_SIGNALS)
+LOAD_NAMES = tuple(c.name for c in LOADS)
+
+# The channels whose fatigue is reported, unless a campaign names others.
+FATIGUE_CHANNELS = (
+    "blade1_root_flapwise_moment",
+    "blade1_root_edgewise_moment",
+    "tower_base_fore_aft_moment",
+    "tower_base_side_side_moment",
+)
+
+BY_NAME = {c.name: c for c in (*STATES, *WIND_SIGNALS, *LOADS)}

@@ -1,0 +1,38 @@
+"""The plain result of one simulated case: arrays that fatigue, logbook, report and viewer read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass
+class Trajectory:
+    """One case, sampled at the output times.
+
+    time (n,) [s]; state (n, 16) in the order of `channels.STATES`; wind (n, 3) in the order of `channels.WIND_SIGNALS`;
+    loads {channel: (n,)} SI. The status arrays have one entry per output interval, (n-1,): `accepted` is False where any
+    step in the interval fell back, `discrepancy` and `threshold` are the hybrid's norms (NaN where there is no test),
+    `local_error` the embedded error estimate's largest scaled component (NaN for methods without one).
+    `diverged_at` [s] is None for a finished case; otherwise the arrays end there.
+    """
+
+    time: np.ndarray
+    state: np.ndarray
+    wind: np.ndarray
+    loads: dict[str, np.ndarray] = field(default_factory=dict)
+    accepted: np.ndarray = field(default_factory=lambda: np.empty(0, bool))
+    discrepancy: np.ndarray = field(default_factory=lambda: np.empty(0))
+    threshold: np.ndarray = field(default_factory=lambda: np.empty(0))
+    local_error: np.ndarray = field(default_factory=lambda: np.empty(0))
+    steps: int = 0
+    evaluations: int = 0
+    clamped_lookups: int = 0
+    wall_time: float = 0.0
+    diverged_at: float | None = None
+
+    @property
+    def duration(self) -> float:
+        """Simulated time covered by the arrays [s]."""
+        return float(self.time[-1] - self.time[0])
