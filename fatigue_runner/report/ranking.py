@@ -1,0 +1,267 @@
+"""Which integrator is good enough, and what does it cost: pure functions over the rows of the results table.
+
+Standard library only, so that the command line can use it without a delay.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from statistics import median
+
+from fatigue_runner.channels import BY_NAME
+from fatigue_runner.report.cells import (
+    Row,
+    format_count,
+    format_percent,
+    format_step,
+    number,
+    numbers,
+    text,
+    truth,
+)
+
+# Good enough for engineering (well below the scatter between seeds), and good enough to validate against.
+LEVELS = (0.01, 0.001)
+
+_DEL = re.compile(r"^del_(?!error_)(?P<channel>.+)_m(?P<exponent>\d+(?:\.\d+)?)$")
+
+
+@dataclass(frozen=True)
+class DelError:
+    """The largest relative DEL error of one integrator and where it was met; `value` keeps its sign."""
+
+    value: float
+    channel: str
+    exponent: float
+    case_id: str
+    wind_speed: float | None
+
+    @property
+    def size(self) -> float:
+        """The error without its sign [-]."""
+        return abs(self.value)
+
+    def where(self) -> str:
+        """The place in words: channel, Wöhler exponent, wind."""
+        channel = BY_NAME.get(self.channel)
+        text = f"{channel.label if channel else self.channel}, m = {self.exponent:g}"
+        return text if self.wind_speed is None else f"{text}, {self.wind_speed:.3g} m/s"
+
+
+@dataclass(frozen=True)
+class MethodSummary:
+    """One integrator (method, step, corrector, mode) over all its cases.
+
+    Costs are medians over the finished cases, per simulated second; errors are relative to the reference of
+    the same wind and None where nothing could be compared. `on_front`: no other integrator is both cheaper
+    (in evaluations) and better (worst DEL error). One with a diverged or failed case is never on the front.
+    """
+
+    method: str
+    step: float | None
+    corrector: str
+    mode: str
+    is_reference: bool
+    cases: int
+    done: int
+    diverged: int
+    failed: int
+    evaluations_per_second: float | None
+    wall_time_per_second: float | None
+    nrmse_median: float | None
+    nrmse_worst: float | None
+    worst_del_error: DelError | None
+    median_del_error: float | None
+    on_front: bool = False
+
+    @property
+    def label(self) -> str:
+        """The integrator as a person reads it: `rk4 20 ms`, `heun 10 ms + affine (hybrid)`."""
+        text = self.method if self.step is None else f"{self.method} {format_step(self.step)}"
+        if self.corrector:
+            text += f" + {self.corrector}" + (f" ({self.mode})" if self.mode else "")
+        return text
+
+    @property
+    def complete(self) -> bool:
+        """Whether every case ended as it should."""
+        return self.cases > 0 and self.done == self.cases
+
+
+def integrator_key(row: Row) -> tuple[str, float | None, str, str, bool]:
+    """What makes two rows the same integrator: (method, step, corrector, mode, is_reference)."""
+    step, corrector = number(row, "step"), text(row, "corrector")
+    return (
+        text(row, "method"),
+        step,
+        corrector,
+        text(row, "mode") if corrector else "",
+        truth(row, "is_reference"),
+    )
+
+
+def fatigue_columns(rows: Sequence[Row]) -> list[tuple[str, float, str]]:
+    """(channel, exponent, suffix) of every DEL that the table has, in the order of its columns."""
+    names = dict.fromkeys(str(column) for row in rows for column in row)
+    found = (m for m in map(_DEL.match, names) if m is not None)
+    return [(m["channel"], float(m["exponent"]), f"{m['channel']}_m{m['exponent']}") for m in found]
+
+
+def rank(rows: Iterable[Row]) -> list[MethodSummary]:
+    """One summary per integrator, cheapest first (evaluations per simulated second), the reference last."""
+    table = list(rows)
+    columns = fatigue_columns(table)
+    groups: dict[tuple[str, float | None, str, str, bool], list[Row]] = {}
+    for row in table:
+        groups.setdefault(integrator_key(row), []).append(row)
+    summaries = _mark_front([_summarise(key, group, columns) for key, group in groups.items()])
+    return sorted(summaries, key=lambda s: (s.is_reference, _or_infinity(s.evaluations_per_second), s.label))
+
+
+def _summarise(
+    key: tuple[str, float | None, str, str, bool], rows: list[Row], columns: list[tuple[str, float, str]]
+) -> MethodSummary:
+    method, step, corrector, mode, is_reference = key
+    done = [row for row in rows if text(row, "status") == "done"]
+    nrmse = numbers(done, "nrmse_max")
+    errors = [] if is_reference else _del_errors(done, columns)
+    return MethodSummary(
+        method=method,
+        step=step,
+        corrector=corrector,
+        mode=mode,
+        is_reference=is_reference,
+        cases=len(rows),
+        done=len(done),
+        diverged=sum(text(row, "status") == "diverged" for row in rows),
+        failed=sum(text(row, "status") == "failed" for row in rows),
+        evaluations_per_second=_median_of(numbers(done, "evaluations_per_second")),
+        wall_time_per_second=_median_of(wall_times_per_second(done)),
+        nrmse_median=None if is_reference else _median_of(nrmse),
+        nrmse_worst=None if is_reference else max(nrmse, default=None),
+        worst_del_error=max(errors, key=lambda e: e.size, default=None),
+        median_del_error=_median_of([e.size for e in errors]),
+    )
+
+
+def wall_times_per_second(rows: Iterable[Row]) -> list[float]:
+    """Measured wall time of the integration per simulated second, of every row that has both."""
+    pairs = ((number(row, "wall_time"), number(row, "duration")) for row in rows)
+    return [wall / duration for wall, duration in pairs if wall is not None and duration]
+
+
+def _del_errors(rows: list[Row], columns: list[tuple[str, float, str]]) -> list[DelError]:
+    found = []
+    for row in rows:
+        for channel, exponent, suffix in columns:
+            value = number(row, f"del_error_{suffix}")
+            if value is not None:
+                found.append(
+                    DelError(value, channel, exponent, text(row, "case_id"), number(row, "wind_speed"))
+                )
+    return found
+
+
+def _mark_front(summaries: list[MethodSummary]) -> list[MethodSummary]:
+    points = [
+        (_or_infinity(s.evaluations_per_second), _error_size(s)) if _competes(s) else None for s in summaries
+    ]
+    return [replace(s, on_front=_undominated(p, points)) for s, p in zip(summaries, points, strict=True)]
+
+
+def _competes(summary: MethodSummary) -> bool:
+    compared = summary.evaluations_per_second is not None and summary.worst_del_error is not None
+    return summary.complete and not summary.is_reference and compared
+
+
+def _error_size(summary: MethodSummary) -> float:
+    return math.inf if summary.worst_del_error is None else summary.worst_del_error.size
+
+
+def _undominated(point: tuple | None, points: list[tuple | None]) -> bool:
+    if point is None:
+        return False
+    others = (p for p in points if p is not None and p != point)
+    return not any(p[0] <= point[0] and p[1] <= point[1] for p in others)
+
+
+def cheapest_within(summaries: Iterable[MethodSummary], level: float) -> MethodSummary | None:
+    """The integrator with fewest evaluations whose worst DEL error is within `level`; None without one."""
+    good = [s for s in summaries if _competes(s) and _error_size(s) <= level]
+    return min(good, key=lambda s: (_or_infinity(s.evaluations_per_second), _error_size(s)), default=None)
+
+
+def reference_of(summaries: Iterable[MethodSummary]) -> MethodSummary | None:
+    """The reference's summary; None where the campaign ran without one."""
+    return next((s for s in summaries if s.is_reference), None)
+
+
+def answer(summaries: Sequence[MethodSummary], levels: Sequence[float] = LEVELS) -> list[str]:
+    """The result in sentences: the cheapest integrator at each level of DEL error, and what is out of it."""
+    reference, tested = reference_of(summaries), [s for s in summaries if not s.is_reference]
+    if not tested:
+        return ["Only the reference was run: there is no integrator to compare."]
+    if not any(_competes(s) for s in tested):
+        why = (
+            "no reference was run"
+            if reference is None
+            else "none finished all its cases beside the reference"
+        )
+        return [f"No integrator can be judged: {why}.", *_casualties(summaries)]
+    return [*(_level_sentence(tested, reference, level) for level in levels), *_casualties(summaries)]
+
+
+def _level_sentence(tested: list[MethodSummary], reference: MethodSummary | None, level: float) -> str:
+    best = cheapest_within(tested, level)
+    if best is None:
+        nearest = min((s for s in tested if _competes(s)), key=_error_size)
+        return (
+            f"No integrator is within {format_percent(level)} DEL error; the nearest is {nearest.label} "
+            f"with {_worst(nearest)}."
+        )
+    return (
+        f"Cheapest within {format_percent(level)} DEL error: {best.label}, "
+        f"{_count(best.evaluations_per_second)} evaluations per simulated second{_saving(best, reference)}; "
+        f"its worst is {_worst(best)}."
+    )
+
+
+def _worst(summary: MethodSummary) -> str:
+    error = summary.worst_del_error
+    return "unknown" if error is None else f"{format_percent(error.size)} ({error.where()})"
+
+
+def _count(value: float | None) -> str:
+    return "unknown" if value is None else format_count(value)
+
+
+def _saving(best: MethodSummary, reference: MethodSummary | None) -> str:
+    if reference is None or not reference.evaluations_per_second or not best.evaluations_per_second:
+        return ""
+    ratio = reference.evaluations_per_second / best.evaluations_per_second
+    return f", {format_count(ratio)} times fewer than the reference" if ratio >= 1.05 else ""
+
+
+def _casualties(summaries: Iterable[MethodSummary]) -> list[str]:
+    lines = []
+    for s in summaries:
+        lost = [
+            f"{n} of {s.cases} cases {what}"
+            for n, what in ((s.diverged, "diverged"), (s.failed, "failed"))
+            if n
+        ]
+        if lost:
+            role = "The reference, " if s.is_reference else "Not considered: "
+            lines.append(f"{role}{s.label}: {' and '.join(lost)}.")
+    return lines
+
+
+def _or_infinity(value: float | None) -> float:
+    return math.inf if value is None else value
+
+
+def _median_of(values: list[float]) -> float | None:
+    return float(median(values)) if values else None
