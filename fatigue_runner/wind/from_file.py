@@ -1,0 +1,107 @@
+"""Wind from a comma-separated file: one row per sample, with a header, at a uniform time step."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+
+from fatigue_runner.channels import WIND_NAMES
+from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.wind.series import SeriesWind
+from fatigue_runner.wind.source import SOURCES
+
+COLUMNS = ("time", *WIND_NAMES)
+
+
+def read_wind_file(path: str | Path) -> SeriesWind:
+    """Cubic series through the samples of a csv file: time [s], wind_speed [m/s] and the two shears [-].
+
+    The header names the columns, in any order: `time,wind_speed,vertical_shear,horizontal_shear`. Times start
+    at 0 and rise by a constant step. Raises InputError with file and line for anything else.
+    """
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:  # spreadsheets write a byte-order mark
+            reader = csv.reader(file)
+            rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such wind file; check the path") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: cannot be read as a csv file in UTF-8 ({error})") from None
+    if not rows:
+        raise InputError(f"{path}:1: the file is empty; its first line must be {','.join(COLUMNS)}")
+    order = _header(path, *rows[0])
+    samples = np.array([_sample(path, line, row, order) for line, row in rows[1:]])
+    if len(samples) < 2:
+        raise InputError(f"{path}: {len(samples)} samples after the header; a series needs at least two")
+    time_step = _time_step(path, [line for line, _ in rows[1:]], samples[:, 0])
+    try:
+        return SeriesWind(time_step, samples[:, 1:], origin=path.stem)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _header(path: Path, line: int, row: list[str]) -> list[int]:
+    """Where each of COLUMNS stands in a row."""
+    names = [field.strip() for field in row]
+    for name in names:
+        if name not in COLUMNS:
+            raise InputError(
+                f"{path}:{line}: unknown column {name!r}{did_you_mean(name, COLUMNS)} "
+                f"(the header must be {','.join(COLUMNS)})"
+            )
+        if names.count(name) > 1:
+            raise InputError(f"{path}:{line}: column {name!r} appears twice; keep one")
+    missing = [name for name in COLUMNS if name not in names]
+    if missing:
+        raise InputError(
+            f"{path}:{line}: column {missing[0]!r} is missing; the header must be {','.join(COLUMNS)}"
+        )
+    return [names.index(name) for name in COLUMNS]
+
+
+def _sample(path: Path, line: int, row: list[str], order: list[int]) -> list[float]:
+    """The numbers of one row in the order of COLUMNS."""
+    if len(row) != len(COLUMNS):
+        raise InputError(
+            f"{path}:{line}: {len(row)} fields, the header has {len(COLUMNS)}; separate them by commas"
+        )
+    sample = []
+    for name, position in zip(COLUMNS, order, strict=True):
+        try:
+            value = float(row[position])
+        except ValueError:
+            raise InputError(f"{path}:{line}: {name} is {row[position].strip()!r}; give a number") from None
+        if not math.isfinite(value):
+            raise InputError(f"{path}:{line}: {name} is {value}; fill or cut the gap")
+        if name == "wind_speed" and value <= 0:
+            raise InputError(
+                f"{path}:{line}: wind_speed is {value:g} m/s; the aerodynamics need positive wind speeds"
+            )
+        sample.append(value)
+    return sample
+
+
+def _time_step(path: Path, lines: list[int], time: np.ndarray) -> float:
+    """The uniform step [s] of a column of times that starts at 0."""
+    if time[0] != 0.0:
+        raise InputError(
+            f"{path}:{lines[0]}: the first time is {time[0]:g} s; it must be 0, where the run starts"
+        )
+    steps = np.diff(time)
+    for i in np.flatnonzero(steps <= 0)[:1]:
+        order = f"time {time[i + 1]:g} s is not after {time[i]:g} s"
+        raise InputError(f"{path}:{lines[i + 1]}: {order}; times must rise")
+    # Twelve digits: the step read from a long column of rounded times is the one that was meant.
+    step = float(f"{time[-1] / (len(time) - 1):.12g}")
+    usual = float(np.median(steps))
+    for i in np.flatnonzero(np.abs(steps - usual) > 1e-3 * usual)[:1]:
+        change = f"the time step changes here to {steps[i]:g} s (elsewhere {usual:g} s)"
+        raise InputError(f"{path}:{lines[i + 1]}: {change}; resample the series at a uniform step")
+    return step
+
+
+SOURCES["file"] = read_wind_file

@@ -1,0 +1,126 @@
+"""What every wind source is: the base class and the register of kinds."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fatigue_runner.channels import WIND_NAMES
+from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.wind.cells import ROUNDING, cell_count, evaluate, minimum
+from fatigue_runner.wind.checks import number
+
+# kind -> what makes a source of its parameters; filled as the modules of this folder are imported.
+SOURCES: dict[str, Callable[..., WindSource]] = {}
+
+
+class WindSource(ABC):
+    """Wind of one case in time: speed v [m/s], vertical and horizontal shear [-] (`channels.WIND_SIGNALS`).
+
+    The local wind on the disc is v (1 + vertical_shear z/R + horizontal_shear y/R). A subclass sets `kind`,
+    gives the abstract members below, and `length` where the source has an end.
+    """
+
+    kind: ClassVar[str]
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "kind" in cls.__dict__:
+            SOURCES[cls.kind] = cls
+
+    @classmethod
+    @abstractmethod
+    def example(cls) -> WindSource:
+        """A small instance, at least 10 s long; what the contract tests of all sources run on."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Short, and fit for a file name; `label` has every parameter."""
+
+    @property
+    @abstractmethod
+    def mean_speed(self) -> float:
+        """Mean hub-height wind speed [m/s]; the speed at the start is `at(0)`."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> dict[str, Any]:
+        """Plain values that describe the source, by the names of the results table where it has one."""
+
+    @property
+    @abstractmethod
+    def cell_key(self) -> float | None:
+        """Cell duration [s], None for constant signals. Winds with equal keys (or None) can share a block."""
+
+    @property
+    def length(self) -> float:
+        """Time [s] for which the source says something; infinite where the last value holds on."""
+        return math.inf
+
+    @abstractmethod
+    def _cells(self, n_cells: int) -> np.ndarray:
+        """The first n_cells cells, (n_cells, 4, n_signals); one cell where `cell_key` is None."""
+
+    @property
+    def label(self) -> dict[str, Any]:
+        """The parameters that describe the source, for tables and logs; `wind_source` is its kind."""
+        return {"wind_source": self.kind, "wind_speed": self.mean_speed, **self.parameters}
+
+    def cells(self, duration: float) -> tuple[float, np.ndarray]:
+        """(cell_duration [s], coefficients (n_cells, 4, n_signals)) for the time from 0 to `duration` [s].
+
+        Raises InputError where the source is shorter than `duration`: it never repeats itself silently.
+        """
+        duration = number("duration", duration, above=0.0, unit=" s")
+        if duration > self.length * (1 + ROUNDING):
+            raise InputError(
+                f"wind {self.name} is {self.length:g} s long but the run needs {duration:g} s; "
+                f"make the wind at least {duration:g} s long or the run shorter"
+            )
+        if self.cell_key is None:
+            return max(duration, 1.0), self._cells(1)
+        return self.cell_key, self._cells(cell_count(duration, self.cell_key))
+
+    def at(self, time: Any) -> np.ndarray:
+        """Signals (n, n_signals) at `time` (n,) [s]. Raises InputError outside the source's length."""
+        time = np.atleast_1d(np.asarray(time, float))
+        if not len(time):
+            return np.empty((0, len(WIND_NAMES)))
+        if not (time.min() >= 0.0 and np.isfinite(time.max())):
+            raise InputError(f"wind {self.name} has no value before 0 s or at a time that is not finite")
+        return evaluate(*self.cells(max(float(time.max()), 1e-3)), time)
+
+    @cached_property
+    def lowest_speed(self) -> tuple[float, float]:
+        """(least wind speed [m/s], its time [s]) over the source's length, between the samples too."""
+        cell_duration, coefficients = self.cells(self.length if math.isfinite(self.length) else self._settled)
+        return minimum(cell_duration, coefficients[:, :, 0])
+
+    @property
+    def _settled(self) -> float:
+        """Time [s] after which a source without an end says nothing new."""
+        return 1.0
+
+
+def make_wind(kind: str, **parameters: Any) -> WindSource:
+    """The wind source of that kind ('constant', 'turbulent', 'file', ...) with its parameters by name.
+
+    Raises InputError, with the nearest known name, for an unknown kind or parameter and for a missing one.
+    """
+    if not isinstance(kind, str) or kind not in SOURCES:
+        raise InputError(f"unknown wind source {kind!r}{did_you_mean(str(kind), SOURCES)}")
+    known = inspect.signature(SOURCES[kind]).parameters
+    for key in parameters:
+        if key not in known:
+            raise InputError(f"unknown parameter {key!r} of {kind} wind{did_you_mean(key, known)}")
+    for key, parameter in known.items():
+        if parameter.default is parameter.empty and key not in parameters:
+            raise InputError(f"{kind} wind needs {key!r}; give it a value")
+    return SOURCES[kind](**parameters)

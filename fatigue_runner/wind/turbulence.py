@@ -1,0 +1,207 @@
+"""Turbulent wind as the rotor's parameters in time: IEC Kaimal turbulence projected on the disc.
+
+The longitudinal wind over the disc is V (1 + k z/R) + u'(y, z, t) with the mean shear k = alpha R/H. Its
+least-squares fit by v + G_v z/R + G_h y/R has v = V + a_0, G_v = V k + a_z, G_h = a_y (`rotor_modes`). The
+signals are (v, G_v/v, G_h/v), so v (1 + kappa_v z/R + kappa_h y/R) is that fit, without linearising in u'/V.
+v is a disc average: it varies less than the wind at the hub, whose intensity is the input (600 s at 10 m/s on
+the 5 MW: 0.62 sigma_1). Eddies of the second azimuthal harmonic and up are left out.
+
+Each amplitude is one inverse FFT; its harmonics hold the Kaimal spectrum's exact integral over their frequency
+bin, times H_n. There is nothing below half the first harmonic and above the Nyquist frequency: at a point,
+600 s at 10 m/s hold 89 % of sigma_1^2. `scaled` brings the variance at a point up to sigma_1^2 (as TurbSim's
+ScaleIEC, off by default there too). `amplitudes` says what is random:
+
+- "random-phase" (default; as each point of Veers, SAND88-0152, and TurbSim): expected amplitudes and random
+  phases. Every seed has exactly the expected spectrum and variance, so few seeds give steady loads. The price:
+  seeds differ by their phases only, hence less than ten-minute pieces of stationary wind do.
+- "gaussian": Rayleigh amplitudes and the same phases. The signals are Gaussian at any length, the variance
+  scatters from seed to seed as it does in a stationary process, and more seeds are needed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.wind import rotor_modes, spectrum
+from fatigue_runner.wind.checks import number, refuse_standstill
+from fatigue_runner.wind.series import periodic_cubics
+from fatigue_runner.wind.source import WindSource
+
+# Order n of the azimuthal mode behind each signal, in the order of `channels.WIND_SIGNALS`. A signal's place is
+# its random stream, so signals added at the end leave the others' series as they are.
+MODES = (0, 1, 1)
+AMPLITUDES = ("random-phase", "gaussian")
+
+
+@dataclass(frozen=True)
+class TurbulentWind(WindSource):
+    """IEC 61400-1 turbulence over the rotor: Kaimal spectrum, exponential coherence, one realisation per seed.
+
+    `mean` is the hub-height mean V [m/s]; give either `intensity` = sigma_1/V [-] or `turbulence_class` ("A+",
+    "A", "B", "C": normal turbulence model). The series is periodic, `duration` [s] long, with a sample every
+    `time_step` [s]; halving the time step adds higher harmonics to the same series. `shear_exponent` is alpha;
+    `rotor_radius` and `hub_height` [m] default to the NREL 5 MW. Equal parameters give equal series on every
+    machine, up to the FFT's rounding; one seed gives independent series at different mean wind speeds.
+
+    Raises InputError for parameters out of range. The series is made when first asked for; `cells`, `at` and
+    `lowest_speed` raise InputError where its wind speed would fall to zero.
+    """
+
+    kind = "turbulent"
+
+    mean: float
+    intensity: float | None = None
+    turbulence_class: str | None = None
+    seed: int = 0
+    duration: float = 600.0
+    shear_exponent: float = 0.2
+    time_step: float = 0.2
+    rotor_radius: float = 63.0
+    hub_height: float = 90.0
+    amplitudes: str = "random-phase"
+    scaled: bool = False
+
+    def __post_init__(self) -> None:
+        for key, bounds in BOUNDS.items():
+            if key != "intensity" or self.intensity is not None:
+                object.__setattr__(self, key, number(f"turbulent wind: {key}", getattr(self, key), **bounds))
+        if (self.intensity is None) == (self.turbulence_class is None):
+            how = "neither" if self.intensity is None else "both"
+            raise InputError(
+                f"turbulent wind has {how} of intensity and turbulence_class; give exactly one of them"
+            )
+        if self.turbulence_class is not None:
+            spectrum.turbulence_class(self.turbulence_class)
+        if isinstance(self.seed, bool) or not hasattr(self.seed, "__index__") or self.seed < 0:
+            raise InputError(f"turbulent wind: seed must be a whole number, 0 or more, got {self.seed!r}")
+        object.__setattr__(self, "seed", self.seed.__index__())
+        if self.amplitudes not in AMPLITUDES:
+            near = did_you_mean(str(self.amplitudes), AMPLITUDES)
+            raise InputError(f"turbulent wind: unknown amplitudes {self.amplitudes!r}{near}")
+        if not isinstance(self.scaled, bool):
+            raise InputError(f"turbulent wind: scaled must be true or false, got {self.scaled!r}")
+        if self.duration < 4 * self.time_step:
+            short = f"duration {self.duration:g} s is less than four time steps of {self.time_step:g} s"
+            raise InputError(f"turbulent wind: {short}; make it longer or the time step shorter")
+
+    @classmethod
+    def example(cls) -> TurbulentWind:
+        return cls(9.0, intensity=0.12, seed=3, duration=30.0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Without the series: a worker makes it again in less time than it takes to send.
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @property
+    def name(self) -> str:
+        strength = f"ntm{self.turbulence_class}" if self.intensity is None else f"i{self.intensity:g}"
+        return f"turbulent-{self.mean:g}-{strength}-seed{self.seed}"
+
+    @property
+    def mean_speed(self) -> float:
+        return self.mean
+
+    @property
+    def mean_shear(self) -> float:
+        """Linear vertical shear of the mean wind, alpha R/H: the power law's slope at the hub."""
+        return self.shear_exponent * self.rotor_radius / self.hub_height
+
+    @property
+    def sigma(self) -> float:
+        """sigma_1 [m/s], the standard deviation of the longitudinal wind at a point."""
+        if self.intensity is None:
+            return spectrum.normal_turbulence_sigma(self.turbulence_class, self.mean)
+        return self.intensity * self.mean
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        derived = {"vertical_shear": self.mean_shear, "horizontal_shear": 0.0}
+        derived["turbulence_intensity"] = self.sigma / self.mean
+        given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("mean", "intensity")}
+        return {**derived, **given}
+
+    @property
+    def cell_key(self) -> float:
+        return self.time_step
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of one period: even, and enough for `duration`."""
+        return 2 * math.ceil(self.duration / self.time_step / 2 - 1e-9)
+
+    @property
+    def length(self) -> float:
+        return self.samples * self.time_step
+
+    @cached_property
+    def modal_series(self) -> np.ndarray:
+        """Amplitudes of the fluctuation in the modes at the samples, (n, 3) [m/s]: a_0, a_z, a_y; zero mean."""
+        variances = modal_variances(
+            self.mean, self.rotor_radius, self.hub_height, self.samples, self.time_step, self.scaled
+        )
+        half = np.zeros((self.samples // 2 + 1, len(MODES)), complex)
+        for place, variance in enumerate(variances):
+            stream = (place, round(1000 * self.mean))  # so that one seed is independent from speed to speed
+            power = variance
+            if self.amplitudes == "gaussian":
+                power = variance * -np.log1p(-uniform(self.seed, (*stream, 1), len(variance)))
+            phase = 2 * np.pi * uniform(self.seed, (*stream, 0), len(variance))
+            half[1:-1, place] = np.sqrt(power / 2) * np.exp(1j * phase)  # half of A = sqrt(2 * variance)
+        return np.fft.irfft(half, self.samples, axis=0, norm="forward") * self.sigma
+
+    @cached_property
+    def _coefficients(self) -> np.ndarray:
+        fit = self.modal_series + np.array([self.mean, self.mean * self.mean_shear, 0.0])
+        speed = fit[:, :1]
+        way_out = "take another seed, less turbulence or more wind"
+        refuse_standstill(self.name, self.time_step, periodic_cubics(speed, self.time_step), way_out)
+        return periodic_cubics(np.concatenate([speed, fit[:, 1:] / speed], axis=1), self.time_step)
+
+    def _cells(self, n_cells: int) -> np.ndarray:
+        return self._coefficients[:n_cells]
+
+
+BOUNDS: dict[str, dict[str, Any]] = {
+    "mean": {"above": 0.0, "at_most": 100.0, "unit": " m/s"},
+    "intensity": {"at_least": 0.0, "at_most": 1.0, "hint": "it is sigma_1 / mean: 0.14 for 14 %"},
+    "duration": {"above": 0.0, "at_most": 86400.0, "unit": " s"},
+    "time_step": {"at_least": 0.01, "at_most": 1.0, "unit": " s"},
+    "shear_exponent": {"at_least": -1.0, "at_most": 1.0, "hint": "IEC 61400-1 has 0.2"},
+    "rotor_radius": {"above": 0.0, "unit": " m"},
+    "hub_height": {"above": 0.0, "unit": " m"},
+}
+
+
+@lru_cache(maxsize=64)
+def modal_variances(
+    mean: float, rotor_radius: float, hub_height: float, samples: int, time_step: float, scaled: bool
+) -> np.ndarray:
+    """Diagonal of the spectral matrix per harmonic, (3, samples/2 - 1), as shares of sigma_1^2; read-only.
+
+    Harmonic k = 1, 2, ... has frequency k / (samples * time_step) and holds the bin half a step to either side;
+    the mean and the Nyquist frequency hold nothing. Cached: all seeds and intensities of one mean wind speed
+    share it.
+    """
+    scale, bin_width = spectrum.length_scale(hub_height), 1 / (samples * time_step)
+    harmonic = np.arange(1, samples // 2)
+    low, high = (harmonic - 0.5) * bin_width, (harmonic + 0.5) * bin_width
+    point = spectrum.kaimal_variance(low, high, mean, scale)
+    if scaled:
+        point = point / point.sum()
+    decay = spectrum.coherence_decay(harmonic * bin_width, mean, scale) * rotor_radius
+    admittances = {n: rotor_modes.admittance(n, decay) for n in set(MODES)}
+    variances = point * np.stack([admittances[n] for n in MODES])
+    variances.flags.writeable = False
+    return variances
+
+
+def uniform(seed: int, stream: tuple[int, ...], count: int) -> np.ndarray:
+    """Random numbers in [0, 1) of 53 bits, equal on every machine: raw PCG64 words, a stream numpy guarantees."""
+    words = np.random.PCG64(np.random.SeedSequence(seed, spawn_key=stream)).random_raw(count)
+    return (words >> np.uint64(11)) * 2.0**-53
