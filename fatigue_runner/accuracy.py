@@ -1,0 +1,112 @@
+"""How far a trajectory is from its reference: normalised errors per state, and the paper's figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from fatigue_runner.channels import STATE_NAMES
+from fatigue_runner.errors import InputError
+
+# A reference state whose values agree to this fraction of their magnitude is constant: the rest is rounding.
+CONSTANT_TO = 1e-10
+
+
+class Sampled(Protocol):
+    """What is compared: a `Trajectory`, or anything with its time (n,) [s] and state (n, 16)."""
+
+    time: np.ndarray
+    state: np.ndarray
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Errors against a reference, all without unit.
+
+    nrmse {state: RMS error / range of the reference state};
+    delta_e: mean of ((x - x_ref) / (|x_ref| + 1e-18))² over states and time, the figure of arXiv:2504.05493,
+    which zero crossings dominate; delta_e_range: mean of (error / range of the reference state)².
+    """
+
+    nrmse: dict[str, float]
+    delta_e: float
+    delta_e_range: float
+
+    @property
+    def nrmse_max(self) -> float:
+        """Error of the worst state."""
+        return max(self.nrmse.values())
+
+    @property
+    def nrmse_mean(self) -> float:
+        """Mean over the states."""
+        return sum(self.nrmse.values()) / len(self.nrmse)
+
+    def to_dict(self) -> dict[str, float]:
+        """The results table's columns: nrmse_max, nrmse_mean, delta_e, delta_e_range, then nrmse_<state>."""
+        summary = {
+            "nrmse_max": self.nrmse_max,
+            "nrmse_mean": self.nrmse_mean,
+            "delta_e": self.delta_e,
+            "delta_e_range": self.delta_e_range,
+        }
+        return summary | {f"nrmse_{name}": value for name, value in self.nrmse.items()}
+
+
+def compare(test: Sampled, reference: Sampled) -> Accuracy:
+    """Accuracy of `test` against `reference`, sampled at the same times.
+
+    Azimuths are compared as angles that grow, not wrapped: error of the angle over the angle turned. A state
+    that is constant in the reference has no range: its error is taken relative to its magnitude, or counts as
+    infinite when the reference is zero throughout and the test is not. No error is 0 in either case.
+    Raises InputError when the times differ (a case that diverged ends early: it has no accuracy) or a state
+    is not finite.
+    """
+    x, x_ref = _states(test, "test"), _states(reference, "reference")
+    t, t_ref = np.asarray(test.time, dtype=float), np.asarray(reference.time, dtype=float)
+    if t.shape != t_ref.shape:
+        raise InputError(
+            f"the trajectory has {t.size} samples to {t[-1]:g} s, its reference {t_ref.size} to "
+            f"{t_ref[-1]:g} s; compare cases with the same output step that both ran to the end"
+        )
+    worst = float(np.abs(t - t_ref).max())
+    if worst > 1e-9 * max(1.0, float(np.abs(t_ref).max())):
+        raise InputError(
+            f"the output times of trajectory and reference differ by up to {worst:g} s; "
+            "use one output step for both"
+        )
+    error = x - x_ref
+    rms = np.sqrt(np.mean(error**2, axis=0))
+    with np.errstate(divide="ignore", invalid="ignore"):  # 0 / 0 is not used, x / 0 is meant
+        nrmse = np.where(rms == 0.0, 0.0, rms / _scales(x_ref))
+    return Accuracy(
+        nrmse=dict(zip(STATE_NAMES, nrmse.tolist(), strict=True)),
+        delta_e=float(np.mean((error / (np.abs(x_ref) + 1e-18)) ** 2)),
+        delta_e_range=float(np.mean(nrmse**2)),
+    )
+
+
+def _scales(x_ref: np.ndarray) -> np.ndarray:
+    """What each state's error is divided by, (16,): its range, or its magnitude where it is constant."""
+    magnitude, extent = np.abs(x_ref).max(axis=0), np.ptp(x_ref, axis=0)
+    return np.where(extent <= CONSTANT_TO * magnitude, magnitude, extent)
+
+
+def _states(trajectory: Sampled, role: str) -> np.ndarray:
+    state = np.asarray(trajectory.state, dtype=np.float64)
+    samples = np.asarray(trajectory.time).size
+    if state.shape != (samples, len(STATE_NAMES)) or samples == 0:
+        raise InputError(
+            f"the {role}'s states must be (n, {len(STATE_NAMES)}) for n times, "
+            f"got {state.shape} and {samples} times"
+        )
+    finite = np.isfinite(state)
+    if not finite.all():
+        row, column = (int(i) for i in np.argwhere(~finite)[0])
+        raise InputError(
+            f"the {role}'s state {STATE_NAMES[column]} is {state[row, column]} at sample {row}; "
+            "a case that diverged has no accuracy"
+        )
+    return state

@@ -1,0 +1,52 @@
+"""What wears: rainflow counting (ASTM E1049), damage-equivalent loads, Miner damage on S-N curves, lifetime.
+
+Pure functions over arrays; nothing here knows the simulation. A series is counted once (`rainflow`), every
+Wöhler exponent is evaluated on the same ranges (`equivalent_load`), and a NaN or a constant is a stated
+condition (`channel_fatigue`), never a number.
+"""
+
+from fatigue_runner.fatigue.checks import FatigueInputError
+from fatigue_runner.fatigue.damage import (
+    ChannelFatigue,
+    channel_fatigue,
+    damage_equivalent_load,
+    damage_ratio,
+    equivalent_load,
+    goodman,
+    load_error,
+    miner_damage,
+    short_term_cycles,
+)
+from fatigue_runner.fatigue.lifetime import (
+    LifetimeLoad,
+    WindClimate,
+    bin_probabilities,
+    case_probabilities,
+    iec_climate,
+    lifetime_equivalent_load,
+)
+from fatigue_runner.fatigue.rainflow import rainflow
+from fatigue_runner.fatigue.sn_curves import SN_CURVES, SNCurve, sn_curve
+
+__all__ = [
+    "SN_CURVES",
+    "ChannelFatigue",
+    "FatigueInputError",
+    "LifetimeLoad",
+    "SNCurve",
+    "WindClimate",
+    "bin_probabilities",
+    "case_probabilities",
+    "channel_fatigue",
+    "damage_equivalent_load",
+    "damage_ratio",
+    "equivalent_load",
+    "goodman",
+    "iec_climate",
+    "lifetime_equivalent_load",
+    "load_error",
+    "miner_damage",
+    "rainflow",
+    "short_term_cycles",
+    "sn_curve",
+]
