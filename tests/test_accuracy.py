@@ -58,11 +58,12 @@ def test_an_azimuth_is_measured_by_the_angle_it_turned():
     assert compare(with_error(reference, error), reference).nrmse["rotor_azimuth"] == pytest.approx(0.001)
 
 
-def test_delta_e_is_the_mean_squared_relative_error_of_the_paper():
+@pytest.mark.parametrize(("level", "tenth"), [(-4.0, 0.4), (-1e-18, 2e-19), (0.0, 1e-19)])
+def test_delta_e_is_the_mean_squared_relative_error_of_the_paper(level, tenth):
     # arXiv:2504.05493: mean over states and time of ((x - x_ref) / (|x_ref| + 1e-18))²
-    reference = trajectory(np.full((N, 16), -4.0))
+    reference = trajectory(np.full((N, 16), level))
     error = np.zeros((N, 16))
-    error[0, 0] = 0.4
+    error[0, 0] = tenth
     assert compare(with_error(reference, error), reference).delta_e == pytest.approx(
         0.01 / (16 * N), rel=1e-12
     )
