@@ -1,0 +1,9 @@
+"""What turns: parameters, beam modes, aerodynamics, equations of motion, loads.
+
+Data flow: data/*.yaml -> beam.py and aerodynamics.py -> parameters.py, tables.py -> Turbine -> generated/kernel.py, which
+tools/generate_kernel.py prints from equations.py.
+"""
+
+from fatigue_runner.turbine.turbine import Turbine, load_turbine
+
+__all__ = ["Turbine", "load_turbine"]

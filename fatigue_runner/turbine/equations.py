@@ -1,0 +1,893 @@
+"""Equations of motion of the T2B1i1cG turbine, derived symbolically; `tools/generate_kernel.py` prints them as code.
+
+Degrees of freedom q: tower fore-aft a, tower side-side s, flap of blades 1-3 f1 f2 f3, collective edge e, rotor azimuth,
+generator azimuth (high-speed side). Method: D'Alembert's principle on the positions of all mass elements,
+    sum over bodies of  integral (dp/dq_j) . (p'' - g) dm  =  Q_j ,
+with the rotor as one flexible body in the rotating hub frame F (floating-frame formulation, e.g. Shabana, Dynamics of
+Multibody Systems, ch. 5). Nothing is linearised, except that products of the blades' axial foreshortening with another
+deflection (third order) are dropped; they are dropped in the position integrals, hence from kinetic energy and forces alike,
+and energy is conserved to rounding.
+
+Frames. I: inertial, x downwind, z up, at the tower base. N: nacelle = Ry(slope_fa a) Rx(-slope_ss s). S: shaft = N tilted.
+F: S turned about its x axis by the azimuth. Blade i: F turned by 120 (i-1) degrees about x ("az frame"), then coned about y:
+axes e1 out of plane (downwind), e2 = e3 x e1 (towards the trailing edge), e3 along the span, as OpenFAST's coned system.
+
+Blade point at distance r from the apex: u = (phi_x f + psi_x e) e1 + (phi_y f + psi_y e) e2 + (r - w) e3 with the foreshortening
+w = (S_ff f^2 + 2 S_fe f e + S_ee e^2)/2. Only integrals of products of (1, r, phi, psi, S) over the mass enter: symbols below.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+# --- parameters: what a turbine is -------------------------------------------------------------------------------------
+
+BLADE_INTEGRALS = {
+    "b_m": "mass of one blade [kg]",
+    "b_m1": "first moment: integral r dm [kg m]",
+    "b_m2": "second moment: integral r^2 dm [kg m2]",
+    "b_fx": "integral phi_x dm",
+    "b_fy": "integral phi_y dm",
+    "b_ex": "integral psi_x dm",
+    "b_ey": "integral psi_y dm",
+    "b_rfx": "integral r phi_x dm",
+    "b_rfy": "integral r phi_y dm",
+    "b_rex": "integral r psi_x dm",
+    "b_rey": "integral r psi_y dm",
+    "b_fxfx": "integral phi_x^2 dm",
+    "b_fyfy": "integral phi_y^2 dm",
+    "b_fxfy": "integral phi_x phi_y dm",
+    "b_exex": "integral psi_x^2 dm",
+    "b_eyey": "integral psi_y^2 dm",
+    "b_exey": "integral psi_x psi_y dm",
+    "b_fxex": "integral phi_x psi_x dm",
+    "b_fyey": "integral phi_y psi_y dm",
+    "b_fxey": "integral phi_x psi_y dm",
+    "b_fyex": "integral phi_y psi_x dm",
+    "b_sff": "integral S_ff dm [kg/m]",
+    "b_sfe": "integral S_fe dm",
+    "b_see": "integral S_ee dm",
+    "b_rsff": "integral r S_ff dm [kg]",
+    "b_rsfe": "integral r S_fe dm",
+    "b_rsee": "integral r S_ee dm",
+}
+PARAMETERS = {
+    **BLADE_INTEGRALS,
+    "b_kf": "generalised flap stiffness [N/m]",
+    "b_ke": "generalised edge stiffness [N/m]",
+    "b_kfe": "flap-edge coupling stiffness [N/m]",
+    "b_df": "generalised flap damping [N s/m]",
+    "b_de": "generalised edge damping [N s/m]",
+    "b_tip_fx": "phi_x at the tip",
+    "b_tip_fy": "phi_y at the tip",
+    "b_tip_ex": "psi_x at the tip",
+    "b_tip_ey": "psi_y at the tip",
+    "b_root": "distance of the blade root from the apex [m]",
+    "cos_pitch": "cosine of the blade pitch (modes and section axes turn with it)",
+    "sin_pitch": "sine of the blade pitch",
+    "cos_cone": "cosine of the cone angle",
+    "sin_cone": "sine of the cone angle; OpenFAST's sign: negative puts the tips upwind",
+    "cos_tilt": "cosine of the shaft tilt",
+    "sin_tilt": "sine of the shaft tilt; OpenFAST's sign: negative lifts the upwind end",
+    "h_m": "hub mass [kg]",
+    "h_ixx": "hub inertia about the shaft [kg m2]",
+    "h_itt": "hub inertia about the transverse axes [kg m2]",
+    "overhang": "apex from the yaw axis along the shaft [m], negative upwind",
+    "tower_to_shaft": "height of the shaft above the tower top, at the yaw axis [m]",
+    "n_m": "nacelle mass [kg]",
+    "n_x": "nacelle centre downwind of the tower top [m]",
+    "n_y": "nacelle centre sideways [m]",
+    "n_z": "nacelle centre above the tower top [m]",
+    "n_ixx": "nacelle inertia about its centre, roll [kg m2]",
+    "n_iyy": "nacelle inertia about its centre, nodding [kg m2]",
+    "n_izz": "nacelle inertia about its centre, yaw [kg m2]",
+    "g_i": "generator inertia on the high-speed side [kg m2]",
+    "g_ratio": "gearbox ratio",
+    "d_k": "drivetrain torsional stiffness, low-speed side [N m/rad]",
+    "d_d": "drivetrain torsional damping, low-speed side [N m s/rad]",
+    "t_h": "tower height [m]",
+    "t_maa": "tower generalised mass, fore-aft: integral phi^2 dm [kg]",
+    "t_mss": "tower generalised mass, side-side [kg]",
+    "t_fa": "integral phi_fa dm [kg]",
+    "t_ss": "integral phi_ss dm [kg]",
+    "t_zfa": "integral z phi_fa dm [kg m]",
+    "t_zss": "integral z phi_ss dm [kg m]",
+    "t_slope_fa": "slope of the fore-aft mode at the top [1/m]",
+    "t_slope_ss": "slope of the side-side mode at the top [1/m]",
+    "t_short_fa": "foreshortening of the top: integral phi_fa'^2 dz [1/m]",
+    "t_short_ss": "the same, side-side [1/m]",
+    "t_gfa": "integral m(z) S_fa(z) dz [kg/m]: the tower's own weight on its foreshortening",
+    "t_gss": "the same, side-side [kg/m]",
+    "t_ka": "tower stiffness fore-aft [N/m]",
+    "t_ks": "tower stiffness side-side [N/m]",
+    "t_da": "tower damping fore-aft [N s/m]",
+    "t_ds": "tower damping side-side [N s/m]",
+    "gravity": "gravitational acceleration [m/s2]",
+    "radius": "rotor radius R in the aerodynamic coefficients [m]",
+    "q_area": "air density * rotor area / 2 [kg/m]",
+    "tg_k": "generator torque in region 2: k omega^2 [N m s2/rad2]",
+    "tg_w1": "generator speed where torque begins (region 1.5) [rad/s]",
+    "tg_w2": "generator speed where region 2 begins [rad/s]",
+    "tg_a1": "slope of region 1.5 [N m s/rad]",
+    "tg_w3": "generator speed where region 2.5 begins [rad/s]",
+    "tg_a2": "slope of region 2.5 [N m s/rad]",
+    "tg_ws": "speed of zero torque of the region-2.5 line [rad/s]",
+    "tg_w4": "generator speed where region 3 begins [rad/s]",
+    "tg_p": "generator power of region 3 (constant power) [W]",
+    "tg_t": "torque of region 3 (constant torque) [N m]",
+}
+P = {name: sp.Symbol(name, real=True) for name in PARAMETERS}
+
+STATE = sp.symbols("a s f1 f2 f3 e phi gen ad sd f1d f2d f3d ed phid gend", real=True)
+ACCELERATION = sp.symbols("add sdd f1dd f2dd f3dd edd phidd gendd", real=True)
+WIND = sp.symbols("v kv kh", real=True)
+SINE, COSINE = sp.symbols("sin_phi cos_phi", real=True)
+
+# Coefficients of one blade's aerodynamic loads; the equations need the first 24, the load channels all 30.
+TABLES = (
+    "thrust", "thrust_kappa", "thrust_y", "thrust_flap", "thrust_edge",
+    "flap", "flap_kappa", "flap_y", "flap_flap", "flap_edge",
+    "torque", "torque_kappa", "torque_y", "torque_flap", "torque_edge",
+    "edge", "edge_flap", "edge_edge",
+    "tangential_kappa", "tangential_y", "tangential_flap",
+    "bending_kappa", "bending_y", "bending_flap",
+    "tangential", "tangential_edge", "bending", "bending_edge", "edge_kappa", "edge_y",
+)  # fmt: skip
+TABLES_OF_THE_EQUATIONS = 24
+
+HALF_SQRT3 = sp.sqrt(3) / 2
+BLADE_AZIMUTH = (
+    (sp.Integer(1), sp.Integer(0)),
+    (-sp.Rational(1, 2), HALF_SQRT3),
+    (-sp.Rational(1, 2), -HALF_SQRT3),
+)
+
+
+# --- bookkeeping -------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Sheet:
+    """Straight-line assignments: `constants` depend on parameters only, `lines` on the state as well."""
+
+    constants: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    lines: list[tuple[sp.Symbol, sp.Expr]] = field(default_factory=list)
+    _known: dict[sp.Expr, sp.Symbol] = field(default_factory=dict)
+
+    def constant(self, expr: sp.Expr) -> sp.Expr:
+        """A parameter-only expression as one symbol, computed once per run."""
+        expr = sp.sympify(expr)
+        if expr.is_number or expr in P.values():
+            return expr
+        if expr not in self._known:
+            self._known[expr] = sp.Symbol(f"k{len(self._known)}", real=True)
+            self.constants[self._known[expr]] = expr
+        return self._known[expr]
+
+    def collect(self, expr: sp.Expr) -> sp.Expr:
+        """Polynomial in the state symbols with its parameter-only coefficients replaced by constants."""
+        expr = sp.expand(expr)
+        variables = sorted(expr.free_symbols - set(P.values()), key=lambda x: x.name)
+        if not variables:
+            return self.constant(expr)
+        terms = sp.Poly(expr, *variables).terms()
+        return sum(
+            self.constant(c) * sp.prod(x**k for x, k in zip(variables, ks, strict=True)) for ks, c in terms
+        )
+
+    def let(self, name: str, expr: sp.Expr) -> sp.Expr:
+        """Name an intermediate result; numbers and plain symbols stay as they are."""
+        expr = sp.sympify(expr)
+        if expr.is_number or expr.is_Symbol:
+            return expr
+        symbol = sp.Symbol(name, real=True)
+        self.lines.append((symbol, expr))
+        return symbol
+
+    def let_vector(self, name: str, vector) -> sp.Matrix:
+        return sp.Matrix([self.let(f"{name}_{axis}", x) for axis, x in zip("xyz", vector, strict=True)])
+
+
+def cross(a, b) -> sp.Matrix:
+    return sp.Matrix(a).cross(sp.Matrix(b))
+
+
+def rot_x_t(c, s, v) -> sp.Matrix:
+    """Rx(angle)^T v."""
+    return sp.Matrix([v[0], c * v[1] + s * v[2], -s * v[1] + c * v[2]])
+
+
+def rot_y_t(c, s, v) -> sp.Matrix:
+    """Ry(angle)^T v."""
+    return sp.Matrix([c * v[0] - s * v[2], v[1], s * v[0] + c * v[2]])
+
+
+def rot_y(c, s, v) -> sp.Matrix:
+    return sp.Matrix([c * v[0] + s * v[2], v[1], -s * v[0] + c * v[2]])
+
+
+def cone(v) -> sp.Matrix:
+    """Coned blade axes -> az frame of the blade."""
+    return rot_y(P["cos_cone"], P["sin_cone"], v)
+
+
+def cone_t(v) -> sp.Matrix:
+    return rot_y_t(P["cos_cone"], P["sin_cone"], v)
+
+
+def cone_tensor(j: sp.Matrix) -> sp.Matrix:
+    c, s = P["cos_cone"], P["sin_cone"]
+    r = sp.Matrix([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    return r * j * r.T
+
+
+def sin_cos_small(sheet: Sheet, name: str, angle) -> tuple[sp.Expr, sp.Expr]:
+    """sin and cos of a tower-top rotation by their Taylor series: to rounding for |angle| < 0.3 rad."""
+    x = sheet.let(f"{name}_angle", angle)
+    y = sheet.let(f"{name}_square", x * x)
+
+    def horner(first: int) -> sp.Expr:
+        terms = [sp.Rational((-1) ** k, sp.factorial(2 * k + first)) for k in range(7)]
+        total = terms[-1]
+        for term in reversed(terms[:-1]):
+            total = term + y * total
+        return total
+
+    return sheet.let(f"{name}_sin", x * horner(1)), sheet.let(f"{name}_cos", horner(0))
+
+
+# --- bodies ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Blade:
+    """Mass integrals of one blade in its coned axes as polynomials in (f, e) and their rates (fd, ed)."""
+
+    f: sp.Expr
+    e: sp.Expr
+    fd: sp.Expr
+    ed: sp.Expr
+
+    def foreshortening(self, kind: str) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+        return P[f"b_{kind}ff"], P[f"b_{kind}fe"], P[f"b_{kind}ee"]
+
+    def first_moment(self) -> sp.Matrix:
+        """integral u dm"""
+        ff, fe, ee = self.foreshortening("s")
+        f, e = self.f, self.e
+        short = (ff * f**2 + 2 * fe * f * e + ee * e**2) / 2
+        return sp.Matrix([P["b_fx"] * f + P["b_ex"] * e, P["b_fy"] * f + P["b_ey"] * e, P["b_m1"] - short])
+
+    def first_moment_rate2(self) -> sp.Matrix:
+        """The part of the second time derivative of integral u dm that remains at zero modal acceleration."""
+        ff, fe, ee = self.foreshortening("s")
+        return sp.Matrix([0, 0, -(ff * self.fd**2 + 2 * fe * self.fd * self.ed + ee * self.ed**2)])
+
+    def second_moment(self) -> sp.Matrix:
+        """J = integral u u^T dm (3, 3)"""
+        f, e = self.f, self.e
+        ff, fe, ee = self.foreshortening("rs")
+        j11 = P["b_fxfx"] * f**2 + 2 * P["b_fxex"] * f * e + P["b_exex"] * e**2
+        j22 = P["b_fyfy"] * f**2 + 2 * P["b_fyey"] * f * e + P["b_eyey"] * e**2
+        j12 = P["b_fxfy"] * f**2 + (P["b_fxey"] + P["b_fyex"]) * f * e + P["b_exey"] * e**2
+        j13 = P["b_rfx"] * f + P["b_rex"] * e
+        j23 = P["b_rfy"] * f + P["b_rey"] * e
+        j33 = P["b_m2"] - (ff * f**2 + 2 * fe * f * e + ee * e**2)
+        return sp.Matrix([[j11, j12, j13], [j12, j22, j23], [j13, j23, j33]])
+
+    def rate(self, quantity):
+        """Time derivative of a polynomial in (f, e)."""
+        return sp.diff(quantity, self.f) * self.fd + sp.diff(quantity, self.e) * self.ed
+
+    def angular(self, mode: str) -> sp.Matrix:
+        """L = integral u x du/d(mode) dm, for mode 'f' or 'e'"""
+        # integral (psi x phi) dm along e3: the Coriolis coupling of flap and edge
+        h = P["b_fyex"] - P["b_fxey"]
+        twist = {"f": self.e * h, "e": -self.f * h}[mode]
+        return sp.Matrix([-P[f"b_r{mode}y"], P[f"b_r{mode}x"], twist])
+
+    def coriolis(self) -> sp.Expr:
+        return P["b_fyex"] - P["b_fxey"]
+
+
+def rotor_sum(sheet: Sheet, expr: sp.Expr, weight: str, blade: Blade) -> sp.Expr:
+    """Sum over the three blades of a blade polynomial times 1, cos or sin of the blade's place on the hub.
+
+    The blades differ only in f and fd, so the sum of a monomial is a harmonic sum such as f1 cos(0) + f2 cos(120) + f3 cos(240).
+    """
+    expr = sp.expand(expr)
+    total = sp.Integer(0)
+    variables = (blade.f, blade.fd)
+    for (kf, kfd), coefficient in sp.Poly(expr, *variables).terms():
+        if kf == kfd == 0:
+            total += 3 * coefficient if weight == "one" else 0
+        else:
+            total += coefficient * sp.Symbol(f"sum_{'f' * kf}{'d' * kfd}_{weight}", real=True)
+    return sheet.collect(total)
+
+
+def harmonic_sums(sheet: Sheet) -> None:
+    """The sums that `rotor_sum` refers to."""
+    f, fd = STATE[2:5], STATE[10:13]
+    for name, product in {
+        "f": f,
+        "d": fd,
+        "ff": [x * x for x in f],
+        "fd": [x * y for x, y in zip(f, fd, strict=True)],
+        "dd": [y * y for y in fd],
+    }.items():
+        one, two, three = (sheet.let(f"{name}_{i + 1}", x) for i, x in enumerate(product))
+        both = sheet.let(f"both_{name}", two + three)
+        for weight, value in {
+            "one": one + both,
+            "cos": one - both / 2,
+            "sin": HALF_SQRT3 * (two - three),
+        }.items():
+            sheet.lines.append((sp.Symbol(f"sum_{name}_{weight}", real=True), value))
+
+
+def sum_vector(sheet: Sheet, v: sp.Matrix, blade: Blade) -> sp.Matrix:
+    """Sum over the blades of a vector given in coned axes, in frame F."""
+    x, y, z = cone(v)
+
+    def total(expr, weight):
+        return rotor_sum(sheet, expr, weight, blade)
+
+    return sp.Matrix([total(x, "one"), total(y, "cos") - total(z, "sin"), total(y, "sin") + total(z, "cos")])
+
+
+def sum_tensor(sheet: Sheet, j: sp.Matrix, blade: Blade) -> sp.Matrix:
+    """Sum over the blades of a symmetric tensor given in coned axes, in frame F.
+
+    For three blades cos(2 alpha) = cos(alpha) and sin(2 alpha) = -sin(alpha) at alpha = 0, 120, 240 degrees.
+    """
+
+    def total(expr, weight):
+        return rotor_sum(sheet, expr, weight, blade)
+
+    t = cone_tensor(j)
+    xy = total(t[0, 1], "cos") - total(t[0, 2], "sin")
+    xz = total(t[0, 1], "sin") + total(t[0, 2], "cos")
+    mean = total((t[1, 1] + t[2, 2]) / 2, "one")
+    difference = total((t[1, 1] - t[2, 2]) / 2, "cos") + total(t[1, 2], "sin")
+    yz = -total((t[1, 1] - t[2, 2]) / 2, "sin") + total(t[1, 2], "cos")
+    return sp.Matrix(
+        [[total(t[0, 0], "one"), xy, xz], [xy, mean + difference, yz], [xz, yz, mean - difference]]
+    )
+
+
+# --- motion of the tower top and the hub -------------------------------------------------------------------------------
+
+
+@dataclass
+class Motion:
+    """Velocity of a point as t_a ad + t_s sd and of its frame as w_a ad + w_s sd; `acceleration` and `spin` at zero q''."""
+
+    t_a: sp.Matrix
+    t_s: sp.Matrix
+    w_a: sp.Matrix
+    w_s: sp.Matrix
+    omega: sp.Matrix
+    acceleration: sp.Matrix  # minus gravity: what a weighing cell would feel
+    spin: sp.Matrix
+
+
+def tower_top(sheet: Sheet) -> Motion:
+    """Motion of the tower top, components in N."""
+    a, s = STATE[0:2]
+    ad, sd = STATE[8:10]
+    mu_a, mu_s = P["t_slope_fa"], P["t_slope_ss"]
+    sin_a, cos_a = sin_cos_small(sheet, "pitch", mu_a * a)
+    sin_r, cos_r = sin_cos_small(sheet, "roll", -mu_s * s)
+
+    def to_n(name, vector):
+        return sheet.let_vector(name, rot_x_t(cos_r, sin_r, rot_y_t(cos_a, sin_a, vector)))
+
+    w_a = sheet.let_vector("wa", [0, mu_a * cos_r, -mu_a * sin_r])
+    w_s = sp.Matrix([-mu_s, 0, 0])
+    rates = sheet.let("rates", mu_a * mu_s * ad * sd)
+    drop = P["t_short_fa"] * ad**2 + P["t_short_ss"] * sd**2
+    return Motion(
+        t_a=to_n("ta", [1, 0, -P["t_short_fa"] * a]),
+        t_s=to_n("ts", [0, 1, -P["t_short_ss"] * s]),
+        w_a=w_a,
+        w_s=w_s,
+        omega=sheet.let_vector("wn", w_a * ad + w_s * sd),
+        acceleration=to_n("top", [0, 0, P["gravity"] - drop]),
+        spin=sheet.let_vector("spin_n", [0, rates * sin_r, rates * cos_r]),
+    )
+
+
+def offset(sheet: Sheet, name: str, motion: Motion, arm) -> Motion:
+    """Motion of another point of the same rigid body, `arm` away."""
+    arm = sp.Matrix(arm)
+    w = motion.omega
+    carried = motion.acceleration + cross(motion.spin, arm) + cross(w, cross(w, arm))
+    return Motion(
+        t_a=sheet.let_vector(f"{name}_ta", motion.t_a + cross(motion.w_a, arm)),
+        t_s=sheet.let_vector(f"{name}_ts", motion.t_s + cross(motion.w_s, arm)),
+        w_a=motion.w_a,
+        w_s=motion.w_s,
+        omega=w,
+        acceleration=sheet.let_vector(f"{name}_acc", carried),
+        spin=motion.spin,
+    )
+
+
+def apex_arm(sheet: Sheet) -> sp.Matrix:
+    """Rotor apex from the tower top, in N (OpenFAST: overhang along the tilted shaft, which crosses the yaw axis)."""
+    return sp.Matrix(
+        [
+            sheet.constant(P["overhang"] * P["cos_tilt"]),
+            0,
+            sheet.constant(P["tower_to_shaft"] + P["overhang"] * P["sin_tilt"]),
+        ]
+    )
+
+
+def to_shaft(sheet: Sheet, name: str, v) -> sp.Matrix:
+    """N -> S. The tilt's sign is OpenFAST's: the shaft axis is (cos tilt, 0, sin tilt) in N."""
+    return sheet.let_vector(name, rot_y_t(P["cos_tilt"], -P["sin_tilt"], v))
+
+
+def hub(sheet: Sheet, top: Motion) -> Motion:
+    """Motion of the rotor apex and of frame F, components in F."""
+    apex = offset(sheet, "apex", top, apex_arm(sheet))
+    phid = STATE[14]
+
+    def to_f(name, v):
+        return sheet.let_vector(name, rot_x_t(COSINE, SINE, to_shaft(sheet, f"{name}_s", v)))
+
+    omega_n = to_f("won", apex.omega)
+    spin = to_f("spin_f", apex.spin)
+    # frame F turns with phid about x: the components of omega_n change by -phid e_x x omega_n
+    return Motion(
+        t_a=to_f("tha", apex.t_a),
+        t_s=to_f("ths", apex.t_s),
+        w_a=to_f("wha", apex.w_a),
+        w_s=to_f("whs", apex.w_s),
+        omega=sp.Matrix([sheet.let("wf_x", omega_n[0] + phid), omega_n[1], omega_n[2]]),
+        acceleration=to_f("acc_f", apex.acceleration),
+        spin=sheet.let_vector("spin_h", [spin[0], spin[1] + phid * omega_n[2], spin[2] - phid * omega_n[1]]),
+    )
+
+
+# --- inertia of the rotor ----------------------------------------------------------------------------------------------
+
+
+@dataclass
+class RotorInertia:
+    mass: sp.Expr
+    first: sp.Matrix
+    inertia: sp.Matrix
+    edge_linear: sp.Matrix  # integral du/de dm, summed
+    edge_angular: sp.Matrix
+    force: sp.Matrix  # integral (a - g) dm at zero q''
+    moment: sp.Matrix  # integral rho x (a - g) dm about the apex
+
+
+def inertia_of(j: sp.Matrix) -> sp.Matrix:
+    return sp.eye(3) * j.trace() - j
+
+
+def let_symmetric(sheet: Sheet, name: str, m: sp.Matrix) -> sp.Matrix:
+    out = sp.zeros(3, 3)
+    for i in range(3):
+        for j in range(i, 3):
+            out[i, j] = out[j, i] = sheet.let(f"{name}_{'xyz'[i]}{'xyz'[j]}", m[i, j])
+    return out
+
+
+def blade_symbols(number: int | None) -> Blade:
+    """Blade 1, 2 or 3; None: a generic blade for sums over the rotor."""
+    e, ed = STATE[5], STATE[13]
+    if number is None:
+        return Blade(sp.Symbol("f", real=True), e, sp.Symbol("fd", real=True), ed)
+    return Blade(STATE[1 + number], e, STATE[9 + number], ed)
+
+
+def body_force(sheet, name, m, mass, first, first_rate, first_rate2, inertia, inertia_rate, spin_moment):
+    """Inertial plus gravity force and moment about the apex of a deforming body whose frame moves with m, zero q''."""
+    w = m.omega
+    whirl = sheet.let_vector(f"{name}_whirl", cross(w, first) + 2 * first_rate)
+    force = m.acceleration * mass + cross(m.spin, first) + cross(w, whirl) + first_rate2
+    momentum = sheet.let_vector(f"{name}_momentum", inertia * w + spin_moment)
+    moment = cross(first, m.acceleration) + inertia * m.spin + cross(w, momentum) + inertia_rate * w
+    return sheet.let_vector(f"{name}_force", force), sheet.let_vector(f"{name}_moment", moment)
+
+
+def rotor(sheet: Sheet, m: Motion) -> RotorInertia:
+    """Hub and three blades as one body in frame F."""
+    harmonic_sums(sheet)
+    b = blade_symbols(None)
+    hub_tensor = sp.diag(P["h_ixx"], P["h_itt"], P["h_itt"])
+    first = sheet.let_vector("rs", sum_vector(sheet, b.first_moment(), b))
+    first_rate = sheet.let_vector("rsd", sum_vector(sheet, b.rate(b.first_moment()), b))
+    first_rate2 = sheet.let_vector("rsdd", sum_vector(sheet, b.first_moment_rate2(), b))
+    inertia = let_symmetric(
+        sheet, "ri", sum_tensor(sheet, inertia_of(b.second_moment()), b).applyfunc(sheet.collect) + hub_tensor
+    )
+    inertia_rate = let_symmetric(sheet, "rid", sum_tensor(sheet, b.rate(inertia_of(b.second_moment())), b))
+    angular_rate = b.angular("f") * b.fd + b.angular("e") * b.ed
+    spin_moment = sheet.let_vector("rl", sum_vector(sheet, angular_rate, b))
+    mass = sheet.constant(3 * P["b_m"] + P["h_m"])
+    force, moment = body_force(
+        sheet, "rot", m, mass, first, first_rate, first_rate2, inertia, inertia_rate, spin_moment
+    )
+    edge_linear = sheet.let_vector("rpe", sum_vector(sheet, sp.diff(b.first_moment(), b.e), b))
+    edge_angular = sheet.let_vector("rle", sum_vector(sheet, b.angular("e"), b))
+    return RotorInertia(mass, first, inertia, edge_linear, edge_angular, force, moment)
+
+
+def az_frame(sheet: Sheet, name: str, v, number: int) -> sp.Matrix:
+    """F -> the blade's az frame."""
+    c, s = BLADE_AZIMUTH[number - 1]
+    return sheet.let_vector(f"{name}_{number}", rot_x_t(c, s, v))
+
+
+def coned(sheet: Sheet, name: str, v, number: int) -> sp.Matrix:
+    """F -> the blade's coned axes."""
+    return sheet.let_vector(f"{name}_c{number}", cone_t(az_frame(sheet, name, v, number)))
+
+
+def modal_inertia(sheet: Sheet, m: Motion, number: int) -> tuple[sp.Expr, sp.Expr]:
+    """integral du/df . (a - g) dm and integral du/de . (a - g) dm of one blade at zero q''."""
+    b = blade_symbols(number)
+    w = coned(sheet, "w", m.omega, number)
+    g = coned(sheet, "g", m.acceleration, number)
+    spin = coned(sheet, "sp", m.spin, number)
+    xx, yy, zz = (sheet.let(f"w{n}_{number}", w[i] * w[i]) for i, n in enumerate(("xx", "yy", "zz")))
+    xy, xz, yz = (
+        sheet.let(f"w{n}_{number}", w[i] * w[j]) for n, i, j in (("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
+    )
+    j = b.second_moment()
+    out = []
+    for mode, other_rate, sign in (("f", b.ed, 1), ("e", b.fd, -1)):
+        x = getattr(b, mode)
+        dj = sp.diff(j, x).applyfunc(sheet.collect)
+        centrifugal = (
+            xy * dj[0, 1]
+            + xz * dj[0, 2]
+            + yz * dj[1, 2]
+            - ((yy + zz) * dj[0, 0] + (xx + zz) * dj[1, 1] + (xx + yy) * dj[2, 2]) / 2
+        )
+        # 2 omega . integral (du/dt x du/dmode): only the in-plane/out-of-plane pair of one blade contributes
+        coriolis = 2 * sign * sheet.constant(b.coriolis()) * w[2] * other_rate
+        linear = sp.diff(b.first_moment(), x).applyfunc(sheet.collect)
+        angular = b.angular(mode).applyfunc(sheet.collect)
+        total = centrifugal + coriolis + linear.dot(g) + angular.dot(spin)
+        out.append(sheet.let(f"h_{mode}_{number}", total))
+    return out[0], out[1]
+
+
+# --- applied forces ----------------------------------------------------------------------------------------------------
+
+TABLE = {name: sp.Symbol(f"c_{name}", real=True) for name in TABLES}
+TIP_SPEED_RATIO = sp.Symbol("tip_speed_ratio", real=True)
+
+
+@dataclass
+class Aerodynamics:
+    """Velocities [m/s] that one blade sees besides the normal wind: x_i = cos part * cos(alpha_i) + sin part * sin(alpha_i)."""
+
+    normal: sp.Expr  # V
+    kappa: tuple[sp.Expr, sp.Expr]  # V kappa_i
+    inplane: tuple[sp.Expr, sp.Expr]  # V y_i
+    pressure: sp.Expr  # rho A V / 6: a blade's third of rho/2 A V
+
+    def load(self, name: str, number: int) -> sp.Expr:
+        """One blade's coefficient times velocity; times `pressure` (and R) it is the load."""
+        c, s = BLADE_AZIMUTH[number - 1]
+        total = TABLE[name] * self.normal
+        for key, (pc, ps) in (("kappa", self.kappa), ("y", self.inplane)):
+            total += TABLE[f"{name}_{key}"] * (pc * c + ps * s) if f"{name}_{key}" in TABLE else 0
+        flap = TABLE[f"{name}_flap"] * STATE[9 + number]
+        return total + flap + (TABLE[f"{name}_edge"] * STATE[13] if f"{name}_edge" in TABLE else 0)
+
+    def total(self, name: str) -> sp.Expr:
+        """Sum over the blades."""
+        flap = TABLE[f"{name}_flap"] * sp.Symbol("sum_d_one", real=True)
+        return 3 * (TABLE[name] * self.normal + TABLE[f"{name}_edge"] * STATE[13]) + flap
+
+    def harmonic(self, name: str) -> tuple[sp.Expr, sp.Expr]:
+        """Sums weighted with cos and sin of the blade's place; what all blades share drops out."""
+        out = []
+        for i, weight in enumerate(("cos", "sin")):
+            flap = TABLE[f"{name}_flap"] * sp.Symbol(f"sum_d_{weight}", real=True)
+            periodic = TABLE[f"{name}_kappa"] * self.kappa[i] + TABLE[f"{name}_y"] * self.inplane[i]
+            out.append(sp.Rational(3, 2) * periodic + flap)
+        return out[0], out[1]
+
+
+def inflow(sheet: Sheet, m: Motion) -> Aerodynamics:
+    """Relative wind at the hub, in F, and the tip-speed ratio of the look-up."""
+    v, kv, kh = WIND
+    ad, sd = STATE[8:10]
+    cos_a, sin_a, cos_r, sin_r = sp.symbols("pitch_cos pitch_sin roll_cos roll_sin", real=True)
+    wind_n = rot_x_t(cos_r, sin_r, rot_y_t(cos_a, sin_a, [v, 0, 0]))
+    wind_s = to_shaft(sheet, "wind_s", sheet.let_vector("wind_n", wind_n))
+    wind = rot_x_t(COSINE, SINE, wind_s)
+    relative = sheet.let_vector("relative", wind - m.t_a * ad - m.t_s * sd)
+    radius = P["radius"]
+    kc = sheet.let("kappa_cos", wind_s[0] * (kv * COSINE - kh * SINE) - radius * m.omega[1])
+    ks = sheet.let("kappa_sin", -wind_s[0] * (kv * SINE + kh * COSINE) - radius * m.omega[2])
+    normal = relative[0]
+    sheet.lines.append((TIP_SPEED_RATIO, radius * m.omega[0] / normal))
+    pressure = sheet.let("pressure", sheet.constant(P["q_area"] / 3) * normal)
+    return Aerodynamics(normal, (kc, ks), (relative[1], relative[2]), pressure)
+
+
+def aero_resultant(sheet: Sheet, aero: Aerodynamics) -> tuple[sp.Matrix, sp.Matrix]:
+    """Aerodynamic force and moment about the apex of the whole rotor, in F."""
+    cg, sg = P["cos_cone"], P["sin_cone"]
+    torque_force = sheet.let("pressure_r", aero.pressure * P["radius"])
+    t0 = aero.total("thrust")
+    (tc, ts), (sc, ss) = aero.harmonic("thrust"), aero.harmonic("tangential")
+    (qc, qs), (mc, ms) = aero.harmonic("torque"), aero.harmonic("bending")
+    force = sp.Matrix([cg * t0, sg * ts - sc, -sg * tc - ss]) * aero.pressure
+    moment = sp.Matrix([cg * aero.total("torque"), mc + sg * qs, ms - sg * qc]) * torque_force
+    return sheet.let_vector("aero_force", force), sheet.let_vector("aero_moment", moment)
+
+
+def generator_torque(sheet: Sheet) -> sp.Expr:
+    """Region law of NREL/TP-500-38060, 7.2; every threshold is a parameter, region 2 alone is k omega^2."""
+    w = STATE[15]
+    return sheet.let(
+        "torque_gen",
+        sp.Piecewise(
+            (0, w < P["tg_w1"]),
+            (P["tg_a1"] * (w - P["tg_w1"]), w < P["tg_w2"]),
+            (P["tg_k"] * w * w, w < P["tg_w3"]),
+            (P["tg_a2"] * (w - P["tg_ws"]), w < P["tg_w4"]),
+            (P["tg_t"] + P["tg_p"] / w, True),
+        ),
+    )
+
+
+def shaft_torque(sheet: Sheet) -> sp.Expr:
+    """Torque of the drivetrain spring and damper on the rotor side."""
+    phi, gen, phid, gend = STATE[6], STATE[7], STATE[14], STATE[15]
+    inverse = sheet.constant(1 / P["g_ratio"])
+    return sheet.let("torque_shaft", P["d_k"] * (phi - gen * inverse) + P["d_d"] * (phid - gend * inverse))
+
+
+# --- assembly ----------------------------------------------------------------------------------------------------------
+
+
+def tower_and_nacelle(sheet: Sheet, top: Motion) -> tuple[dict[str, sp.Expr], dict[str, sp.Expr]]:
+    """Mass terms and generalised forces of the two tower degrees of freedom without the rotor."""
+    a, s = STATE[0:2]
+    ad, sd = STATE[8:10]
+    n = offset(sheet, "nac", top, [P["n_x"], P["n_y"], P["n_z"]])
+    tensor = sp.diag(P["n_ixx"], P["n_iyy"], P["n_izz"])
+    spin_moment = sheet.let_vector("nac_moment", tensor * n.spin + cross(n.omega, tensor * n.omega))
+    mass, force = {}, {}
+    for key, tj, wj in (("a", n.t_a, n.w_a), ("s", n.t_s, n.w_s)):
+        force[key] = -P["n_m"] * tj.dot(n.acceleration) - wj.dot(spin_moment)
+        for other, tk, wk in (("a", n.t_a, n.w_a), ("s", n.t_s, n.w_s)):
+            mass[key + other] = P["n_m"] * tj.dot(tk) + (tensor * wj).dot(wk)
+    mass["aa"] += P["t_maa"]
+    mass["ss"] += P["t_mss"]
+    # the tower's own weight on its foreshortening softens it
+    force["a"] += -sheet.constant(P["t_ka"] - P["gravity"] * P["t_gfa"]) * a - P["t_da"] * ad
+    force["s"] += -sheet.constant(P["t_ks"] - P["gravity"] * P["t_gss"]) * s - P["t_ds"] * sd
+    return mass, force
+
+
+def accelerations() -> tuple[Sheet, tuple[sp.Expr, ...]]:
+    """The whole model: a sheet of assignments, and the 8 accelerations."""
+    sheet = Sheet()
+    top = tower_top(sheet)
+    m = hub(sheet, top)
+    aero = inflow(sheet, m)
+    r = rotor(sheet, m)
+    mass, force = tower_and_nacelle(sheet, top)
+
+    aero_force, aero_moment = aero_resultant(sheet, aero)
+    net_force = sheet.let_vector("net_force", aero_force - r.force)
+    net_moment = sheet.let_vector("net_moment", aero_moment - r.moment)
+    twist = shaft_torque(sheet)
+    torque = generator_torque(sheet)
+
+    # columns of the mass matrix that belong to the rotor; `iw` = moment about the apex per unit acceleration
+    columns = {"a": (m.t_a, m.w_a), "s": (m.t_s, m.w_s), "p": (sp.zeros(3, 1), sp.Matrix([1, 0, 0]))}
+    momentum, angular = {}, {}
+    for key, (t, w) in columns.items():
+        momentum[key] = sheet.let_vector(f"mom_{key}", r.mass * t + cross(w, r.first))
+        angular[key] = sheet.let_vector(f"ang_{key}", cross(r.first, t) + r.inertia * w)
+    for j, k in (("a", "a"), ("a", "s"), ("s", "s"), ("p", "a"), ("p", "s"), ("p", "p")):
+        t, w = columns[j]
+        mass[j + k] = mass.get(j + k, 0) + t.dot(momentum[k]) + w.dot(angular[k])
+    for key, (t, w) in columns.items():
+        force[key] = force.get(key, 0) + t.dot(net_force) + w.dot(net_moment)
+        mass["e" + key] = t.dot(r.edge_linear) + w.dot(r.edge_angular)
+    force["p"] -= twist
+
+    b_ff = sheet.constant(P["b_fxfx"] + P["b_fyfy"])
+    b_fe = sheet.constant(P["b_fxex"] + P["b_fyey"])
+    mass["ee"] = sheet.constant(3 * (P["b_exex"] + P["b_eyey"]))
+    f_sum, e, ed = sp.Symbol("sum_f_one", real=True), STATE[5], STATE[13]
+    force["e"] = (
+        aero.pressure * aero.total("edge") - 3 * (P["b_ke"] * e + P["b_de"] * ed) - P["b_kfe"] * f_sum
+    )
+    for number in (1, 2, 3):
+        b = blade_symbols(number)
+        h_f, h_e = modal_inertia(sheet, m, number)
+        force["e"] -= h_e
+        elastic = P["b_kf"] * b.f + P["b_kfe"] * e + P["b_df"] * b.fd
+        force[f"f{number}"] = sheet.let(
+            f"q_f{number}", aero.pressure * aero.load("flap", number) - h_f - elastic
+        )
+        linear = cone(sp.diff(b.first_moment(), b.f)).applyfunc(sheet.collect)
+        angular_f = cone(b.angular("f")).applyfunc(sheet.collect)
+        for key, (t, w) in columns.items():
+            t_i, w_i = (az_frame(sheet, f"{n}{key}", x, number) for n, x in (("t", t), ("w", w)))
+            mass[f"f{number}{key}"] = sheet.let(f"m_f{number}{key}", t_i.dot(linear) + w_i.dot(angular_f))
+    result = solve(sheet, mass, force, b_ff, b_fe)
+    inverse = sheet.constant(1 / P["g_ratio"])
+    generator = (twist * inverse - torque) * sheet.constant(1 / P["g_i"])
+    order = ("a", "s", "f1", "f2", "f3", "e", "p")
+    return sheet, (*(result[k] for k in order), sheet.let("x_gen", generator))
+
+
+def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Expr]:
+    """Block elimination of the flap coordinates (their block is b_ff times unity), then LDL^T of the 4 x 4 rest."""
+    inverse = sheet.constant(1 / b_ff)
+    keys = ("e", "p", "a", "s")
+    column = {(i, k): (b_fe if k == "e" else mass[f"f{i}{k}"]) for i in (1, 2, 3) for k in keys}
+    scaled = {
+        ik: sheet.let(f"y_{ik[0]}{ik[1]}", inverse * c) if ik[1] != "e" else sheet.constant(inverse * c)
+        for ik, c in column.items()
+    }
+    lower: dict[tuple[str, str], sp.Expr] = {}
+    pivot: dict[str, sp.Expr] = {}
+    scaled_row: dict[tuple[str, str], sp.Expr] = {}
+    rhs: dict[str, sp.Expr] = {}
+    for r, i in enumerate(keys):
+        right = force[i] - sum(scaled[n, i] * force[f"f{n}"] for n in (1, 2, 3))
+        for j in keys[: r + 1]:
+            m_ij = mass.get(i + j, mass.get(j + i))
+            s_ij = sheet.let(f"s_{i}{j}", m_ij - sum(scaled[n, i] * column[n, j] for n in (1, 2, 3)))
+            for k in keys[: keys.index(j)]:
+                s_ij = s_ij - lower[i, k] * scaled_row[j, k]
+            if i == j:
+                pivot[i] = sheet.let(f"inv_{i}", 1 / s_ij)
+            else:
+                scaled_row[i, j] = sheet.let(f"v_{i}{j}", s_ij)
+                lower[i, j] = sheet.let(f"l_{i}{j}", scaled_row[i, j] * pivot[j])
+        for j in keys[:r]:
+            right = right - lower[i, j] * rhs[j]
+        rhs[i] = sheet.let(f"z_{i}", right)
+    x: dict[str, sp.Expr] = {}
+    for r in range(3, -1, -1):
+        i = keys[r]
+        x[i] = sheet.let(f"x_{i}", rhs[i] * pivot[i] - sum(lower[j, i] * x[j] for j in keys[r + 1 :]))
+    for n in (1, 2, 3):
+        coupling = sum(column[n, k] * x[k] for k in keys)
+        x[f"f{n}"] = sheet.let(f"x_f{n}", inverse * (force[f"f{n}"] - coupling))
+    return x
+
+
+# --- load channels -----------------------------------------------------------------------------------------------------
+
+
+def full_motion(m: Motion, sheet: Sheet, name: str, spin_rate: sp.Expr = sp.Integer(0)) -> Motion:
+    """The same motion with the actual accelerations in `acceleration` and `spin`; `spin_rate`: extra spin about x."""
+    add, sdd = ACCELERATION[0:2]
+    spin = m.spin + m.w_a * add + m.w_s * sdd + sp.Matrix([spin_rate, 0, 0])
+    return Motion(
+        m.t_a, m.t_s, m.w_a, m.w_s, m.omega,
+        sheet.let_vector(f"{name}_full", m.acceleration + m.t_a * add + m.t_s * sdd),
+        sheet.let_vector(f"{name}_fullspin", spin),
+    )  # fmt: skip
+
+
+def blade_root(
+    sheet: Sheet, aero: Aerodynamics, m: Motion, number: int
+) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
+    """One blade's force and moment about the apex on the hub, and its moment about the root, in coned axes."""
+    b = blade_symbols(number)
+    fdd, edd = ACCELERATION[1 + number], ACCELERATION[5]
+    own = Motion(
+        m.t_a, m.t_s, m.w_a, m.w_s,
+        coned(sheet, "lw", m.omega, number),
+        coned(sheet, "lg", m.acceleration, number),
+        coned(sheet, "lsp", m.spin, number),
+    )  # fmt: skip
+    first = sheet.let_vector(f"bs{number}", b.first_moment())
+    inertia = let_symmetric(sheet, f"bi{number}", inertia_of(b.second_moment()))
+    inertia_rate = let_symmetric(sheet, f"bid{number}", b.rate(inertia_of(b.second_moment())))
+    l_f, l_e = b.angular("f"), b.angular("e")
+    p_f, p_e = (sp.diff(b.first_moment(), x) for x in (b.f, b.e))
+    force, moment = body_force(
+        sheet, f"blade{number}", own, P["b_m"], first, b.rate(b.first_moment()), b.first_moment_rate2(),
+        inertia, inertia_rate, l_f * b.fd + l_e * b.ed,
+    )  # fmt: skip
+    force = force + p_f * fdd + p_e * edd
+    moment = moment + l_f * fdd + l_e * edd
+    pressure, pressure_r = aero.pressure, aero.pressure * P["radius"]
+    aero_force = sp.Matrix([aero.load("thrust", number), -aero.load("tangential", number), 0]) * pressure
+    aero_moment = sp.Matrix([aero.load("torque", number), aero.load("bending", number), 0]) * pressure_r
+    force = sheet.let_vector(f"blade{number}_net", aero_force - force)
+    moment = sheet.let_vector(f"blade{number}_netm", aero_moment - moment)
+    return force, moment, moment - cross([0, 0, P["b_root"]], force)
+
+
+def from_blade(v, number: int) -> sp.Matrix:
+    """Coned axes -> F."""
+    c, s = BLADE_AZIMUTH[number - 1]
+    return rot_x_t(c, -s, cone(v))
+
+
+def load_channels() -> tuple[Sheet, dict[str, sp.Expr]]:
+    """Loads by their channel names from states, wind and the accelerations (`ACCELERATION`)."""
+    sheet = Sheet()
+    for name, x in zip(("f", "d"), (STATE[2:5], STATE[10:13]), strict=True):
+        both = x[1] + x[2]
+        sheet.lines.append((sp.Symbol(f"sum_{name}_one", real=True), x[0] + both))
+    top = tower_top(sheet)
+    m = hub(sheet, top)
+    aero = inflow(sheet, m)
+    phidd = ACCELERATION[6]
+    rotating = full_motion(m, sheet, "hub", phidd)
+    out: dict[str, sp.Expr] = {}
+    force = -P["h_m"] * rotating.acceleration
+    hub_tensor = sp.diag(P["h_ixx"], P["h_itt"], P["h_itt"])
+    moment = -(hub_tensor * rotating.spin + cross(m.omega, hub_tensor * m.omega))
+    cp, spitch = P["cos_pitch"], P["sin_pitch"]
+    for number in (1, 2, 3):
+        f, mom, root = blade_root(sheet, aero, rotating, number)
+        force, moment = force + from_blade(f, number), moment + from_blade(mom, number)
+        # section axes turn with the pitch about e3, towards feather
+        out[f"blade{number}_root_edgewise_moment"] = cp * root[0] - spitch * root[1]
+        out[f"blade{number}_root_flapwise_moment"] = spitch * root[0] + cp * root[1]
+        b = blade_symbols(number)
+        out[f"blade{number}_tip_out_of_plane"] = P["b_tip_fx"] * b.f + P["b_tip_ex"] * b.e
+        out[f"blade{number}_tip_in_plane"] = P["b_tip_fy"] * b.f + P["b_tip_ey"] * b.e
+    force = sheet.let_vector("rotor_force", force)
+    moment = sheet.let_vector("rotor_moment", moment)
+    out |= tower_base(sheet, top, force, moment)
+    out["low_speed_shaft_torque"] = shaft_torque(sheet)
+    out["generator_torque"] = generator_torque(sheet)
+    out["rotor_thrust"] = P["cos_cone"] * aero.total("thrust") * aero.pressure
+    out["tower_top_fore_aft_acceleration"], out["tower_top_side_side_acceleration"] = ACCELERATION[0:2]
+    return sheet, out
+
+
+def tower_base(sheet: Sheet, top: Motion, force: sp.Matrix, moment: sp.Matrix) -> dict[str, sp.Expr]:
+    """Tower-base moments from the rotor's force and moment about the apex (in F), nacelle, generator and tower."""
+    a, s = STATE[0:2]
+    add, sdd = ACCELERATION[0:2]
+
+    def to_n(v):
+        x, y, z = rot_x_t(COSINE, -SINE, v)
+        return sp.Matrix(rot_y_t(P["cos_tilt"], P["sin_tilt"], [x, y, z]))
+
+    force_n, moment_n = sheet.let_vector("rf_n", to_n(force)), sheet.let_vector("rm_n", to_n(moment))
+    moment_n = moment_n + cross(apex_arm(sheet), force_n)
+    arm = sp.Matrix([P["n_x"], P["n_y"], P["n_z"]])
+    nacelle = full_motion(offset(sheet, "nacl", top, arm), sheet, "nacl")
+    tensor = sp.diag(P["n_ixx"], P["n_iyy"], P["n_izz"])
+    weight = sheet.let_vector("nac_force", -P["n_m"] * nacelle.acceleration)
+    force_n = sheet.let_vector("top_force", force_n + weight)
+    turning = tensor * nacelle.spin + cross(nacelle.omega, tensor * nacelle.omega)
+    # the generator's housing carries the torque that does not accelerate its rotor
+    shaft_axis = sp.Matrix([P["cos_tilt"], 0, P["sin_tilt"]])
+    generator = shaft_axis * (P["g_i"] * ACCELERATION[7])
+    moment_n = sheet.let_vector("top_moment", moment_n + cross(arm, weight) - turning - generator)
+    cos_a, sin_a, cos_r, sin_r = sp.symbols("pitch_cos pitch_sin roll_cos roll_sin", real=True)
+
+    def to_inertial(v):
+        x, y, z = rot_x_t(cos_r, -sin_r, v)
+        return rot_y(cos_a, sin_a, [x, y, z])
+
+    force_i = sheet.let_vector("base_force", to_inertial(force_n))
+    drop = (P["t_short_fa"] * a * a + P["t_short_ss"] * s * s) / 2
+    base = to_inertial(moment_n) + cross([a, s, P["t_h"] - drop], force_i)
+    g = P["gravity"]
+    return {
+        "tower_base_fore_aft_moment": base[1] - P["t_zfa"] * add + g * P["t_fa"] * a,
+        "tower_base_side_side_moment": base[0] + P["t_zss"] * sdd - g * P["t_ss"] * s,
+    }

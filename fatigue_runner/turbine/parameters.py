@@ -1,0 +1,194 @@
+"""From a turbine file to the scalars that the equations of motion take (`equations.PARAMETERS`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import cos, isfinite, radians, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.turbine.beam import INTEGRAND_NAMES, BladeModes, TowerModes, blade_modes, tower_modes
+
+DATA = Path(__file__).parent / "data"
+
+# integrals of the equations by their factors in beam.INTEGRAND_NAMES
+_INTEGRALS = {
+    "b_m": ("1", "1"), "b_m1": ("1", "r"), "b_m2": ("r", "r"),
+    "b_fx": ("1", "phi_x"), "b_fy": ("1", "phi_y"), "b_ex": ("1", "psi_x"), "b_ey": ("1", "psi_y"),
+    "b_rfx": ("r", "phi_x"), "b_rfy": ("r", "phi_y"), "b_rex": ("r", "psi_x"), "b_rey": ("r", "psi_y"),
+    "b_fxfx": ("phi_x", "phi_x"), "b_fyfy": ("phi_y", "phi_y"), "b_fxfy": ("phi_x", "phi_y"),
+    "b_exex": ("psi_x", "psi_x"), "b_eyey": ("psi_y", "psi_y"), "b_exey": ("psi_x", "psi_y"),
+    "b_fxex": ("phi_x", "psi_x"), "b_fyey": ("phi_y", "psi_y"),
+    "b_fxey": ("phi_x", "psi_y"), "b_fyex": ("phi_y", "psi_x"),
+    "b_sff": ("1", "S_ff"), "b_sfe": ("1", "S_fe"), "b_see": ("1", "S_ee"),
+    "b_rsff": ("r", "S_ff"), "b_rsfe": ("r", "S_fe"), "b_rsee": ("r", "S_ee"),
+}  # fmt: skip
+
+_FAST = 1e30  # a generator speed that is never reached [rad/s]
+_RPM = np.pi / 30.0
+
+
+def read_turbine_file(name: str) -> dict[str, Any]:
+    """The mapping of a turbine file, its `base` merged in. `name`: a shipped turbine or a path to a YAML.
+
+    Raises InputError where there is no such turbine, or the file is not YAML.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    path = Path(name)
+    if not path.suffix:
+        path = DATA / f"{name}.yaml"
+        if not path.exists():
+            known = sorted(p.stem for p in DATA.glob("*.yaml") if not p.stem.endswith("airfoils"))
+            raise InputError(
+                f"there is no turbine {name!r}{did_you_mean(name, known)} (or give the path of a YAML file)"
+            )
+    if not path.is_file():
+        raise InputError(f"turbine file {path} does not exist; give a shipped name such as nrel5mw or a path")
+    try:
+        data = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    except (YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"{path} is not a YAML file: {' '.join(str(error).split())}") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: expected a mapping with `name`, `blade`, `tower`, ...")
+    data.setdefault("folder", str(path.parent))
+    base = data.pop("base", None)
+    return _merge(read_turbine_file(base), data) if base else data
+
+
+def _merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in over.items():
+        both = isinstance(value, Mapping) and isinstance(base.get(key), Mapping)
+        merged[key] = _merge(base[key], value) if both else value
+    return merged
+
+
+def equation_parameters(data: Mapping[str, Any]) -> dict[str, float]:
+    """`equations.PARAMETERS` at zero pitch from a turbine file's mapping.
+
+    Raises InputError naming the missing or impossible entry.
+    """
+    try:
+        blade, tower = blade_modes(data), tower_modes(data)
+        cone, tilt = radians(data["geometry"]["precone_deg"]), radians(data["geometry"]["shaft_tilt_deg"])
+        hub, nacelle, drive, env = data["hub"], data["nacelle"], data["drivetrain"], data["environment"]
+        x, y, z = nacelle["centre_of_mass"]
+        radius = data["geometry"]["tip_radius"] * cos(cone)
+        values = {
+            **_blade(blade),
+            **_tower(tower),
+            **generator_law(data["generator"]),
+            "cos_pitch": 1.0, "sin_pitch": 0.0,
+            "cos_cone": cos(cone), "sin_cone": sin(cone), "cos_tilt": cos(tilt), "sin_tilt": sin(tilt),
+            "h_m": hub["mass"], "h_ixx": hub["inertia"], "h_itt": 0.0,
+            "overhang": data["geometry"]["overhang"], "tower_to_shaft": data["geometry"]["tower_top_to_shaft"],
+            "n_m": nacelle["mass"], "n_x": x, "n_y": y, "n_z": z, "n_ixx": 0.0, "n_iyy": 0.0,
+            # the report gives the inertia about the yaw axis
+            "n_izz": nacelle["yaw_inertia"] - nacelle["mass"] * (x * x + y * y),
+            "g_i": drive["generator_inertia"], "g_ratio": drive["gearbox_ratio"],
+            "d_k": drive["torsional_stiffness"], "d_d": drive["torsional_damping"],
+            "gravity": env["gravity"], "radius": radius,
+            "q_area": env["air_density"] * np.pi * radius**2 / 2,
+        }  # fmt: skip
+    except KeyError as missing:
+        raise InputError(
+            f"turbine {data.get('name', '?')}: the entry {missing} is missing; compare nrel5mw.yaml"
+        ) from None
+    if hub.get("centre_of_mass", 0.0):
+        raise InputError("hub: centre_of_mass must be 0: the model has the hub's mass at the rotor apex")
+    return checked({k: float(v) for k, v in values.items()})
+
+
+def checked(values: Mapping[str, float]) -> dict[str, float]:
+    """The parameters, complete and finite; raises InputError for a missing, unknown or non-finite one."""
+    from fatigue_runner.turbine.generated.kernel import PARAMETERS
+
+    for name in values:
+        if name not in PARAMETERS:
+            raise InputError(f"turbine parameters: unknown name {name!r}{did_you_mean(name, PARAMETERS)}")
+    missing = [name for name in PARAMETERS if name not in values]
+    if missing:
+        raise InputError(f"turbine parameters: missing {', '.join(missing)}")
+    for name, value in values.items():
+        if not isfinite(value):
+            raise InputError(f"turbine parameters: {name} is {value}, it must be a finite number")
+    return {name: float(values[name]) for name in PARAMETERS}
+
+
+def _blade(blade: BladeModes) -> dict[str, float]:
+    place = {name: i for i, name in enumerate(INTEGRAND_NAMES)}
+    out = {name: float(blade.integrals[place[a], place[b]]) for name, (a, b) in _INTEGRALS.items()}
+    return out | {
+        "b_kf": blade.flap_stiffness, "b_ke": blade.edge_stiffness, "b_kfe": 0.0,
+        "b_df": blade.flap_damping, "b_de": blade.edge_damping, "b_root": blade.hub_radius,
+        "b_tip_fx": blade.flap_tip[0], "b_tip_fy": blade.flap_tip[1],
+        "b_tip_ex": blade.edge_tip[0], "b_tip_ey": blade.edge_tip[1],
+    }  # fmt: skip
+
+
+def _tower(tower: TowerModes) -> dict[str, float]:
+    out = {"t_h": tower.length}
+    for mode, mass, key, short in (
+        (tower.fore_aft, "t_maa", "fa", "a"), (tower.side_side, "t_mss", "ss", "s"),
+    ):  # fmt: skip
+        out |= {
+            mass: mode.modal_mass, f"t_{key}": mode.mass_shape, f"t_z{key}": mode.mass_height_shape,
+            f"t_slope_{key}": mode.top_slope, f"t_short_{key}": mode.shortening_top,
+            f"t_g{key}": mode.mass_shortening, f"t_k{short}": mode.stiffness, f"t_d{short}": mode.damping,
+        }  # fmt: skip
+    return out
+
+
+def generator_law(generator: Mapping[str, Any]) -> dict[str, float]:
+    """Thresholds of the torque law [rad/s, N m, W]; `law: optimal` is k omega^2 at every speed."""
+    gain = generator["optimal_gain"]
+    law = generator["law"]
+    never = {
+        "tg_w1": -_FAST,
+        "tg_w2": -_FAST,
+        "tg_a1": 0.0,
+        "tg_w3": _FAST,
+        "tg_a2": 0.0,
+        "tg_ws": 0.0,
+        "tg_w4": _FAST,
+    }
+    if law == "optimal":
+        return {"tg_k": gain, **never, "tg_p": 0.0, "tg_t": 0.0}
+    if law != "regions":
+        raise InputError(f"generator: unknown law {law!r}{did_you_mean(str(law), ('optimal', 'regions'))}")
+    r = generator["regions"]
+    w1, w2, w4 = (r[f"{k}_speed_rpm"] * _RPM for k in ("cut_in", "region_2", "region_3"))
+    sync = w4 / (1 + r["slip_percent"] / 100)
+    # region 2.5 is a line from zero torque at `sync` through the rated torque at region 3's first speed
+    slope = r["rated_mechanical_power"] / w4 / (w4 - sync)
+    # it leaves region 2 where gain w^2 = slope (w - sync), the lower root
+    w3 = (slope - np.sqrt(slope * (slope - 4 * gain * sync))) / (2 * gain)
+    return {
+        "tg_k": gain, "tg_w1": w1, "tg_w2": w2, "tg_a1": gain * w2**2 / (w2 - w1), "tg_w3": w3,
+        "tg_a2": slope, "tg_ws": sync, "tg_w4": w4, "tg_p": r["rated_mechanical_power"], "tg_t": 0.0,
+    }  # fmt: skip
+
+
+def at_pitch(parameters: Mapping[str, float], pitch: float) -> dict[str, float]:
+    """The parameters with the blades turned by `pitch` [rad], positive to feather: the modes turn with them.
+
+    Twist and pitch add up, so a displacement (x, y) in coned axes becomes (c x + s y, -s x + c y).
+    """
+    c, s = cos(pitch), sin(pitch)
+    turn = np.array([[c, s], [-s, c]])
+    p = dict(parameters)
+    for stem in ("b_f", "b_e", "b_rf", "b_re", "b_tip_f", "b_tip_e"):
+        p[f"{stem}x"], p[f"{stem}y"] = turn @ [p[f"{stem}x"], p[f"{stem}y"]]
+    for a, b in (("f", "f"), ("e", "e"), ("f", "e")):
+        names = [[f"b_{a}x{b}x", f"b_{a}x{b}y"], [f"b_{a}y{b}x", f"b_{a}y{b}y"]]
+        if a == b:  # symmetric: the equations know only the xy entry
+            names[1][0] = names[0][1]
+        turned = turn @ np.array([[p[n] for n in row] for row in names]) @ turn.T
+        for row, values in zip(names, turned, strict=True):
+            p |= dict(zip(row, map(float, values), strict=True))
+    return p | {"cos_pitch": c, "sin_pitch": s}

@@ -1,0 +1,146 @@
+"""Operating point, and the modes of the spinning turbine about it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fatigue_runner.errors import InputError
+
+if TYPE_CHECKING:
+    from fatigue_runner.turbine.turbine import Turbine
+
+Array = NDArray[np.float64]
+
+AZIMUTHS = 24  # of one revolution; three blades and up to the second harmonic repeat well within them
+
+
+def _states(unknown: Array, azimuths: Array, ratio: float) -> Array:
+    """(16, n) from (fore-aft, side-side, flap, edge, shaft twist, rotor speed), at rest but for the rotation."""
+    a, s, f, e, twist, speed = unknown
+    x = np.zeros((16, len(azimuths)))
+    x[0], x[1], x[2:5], x[5] = a, s, f, e
+    x[6], x[7] = azimuths, ratio * (azimuths - twist)
+    x[14], x[15] = speed, ratio * speed
+    return x
+
+
+def operating_point(
+    turbine: Turbine,
+    wind: float,
+    vertical_shear: float,
+    horizontal_shear: float,
+    azimuth: float,
+    pitch: float,
+) -> Array:
+    """See Turbine.operating_point."""
+    from scipy.optimize import root
+
+    if not wind > 0:
+        raise InputError(f"operating point: the wind speed must be positive, got {wind} m/s")
+    p = turbine.parameters
+    ratio, azimuths = p["g_ratio"], np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
+    scale = np.array([0.1, 0.01, 1.0, 0.1, 1e-3, 1.0])
+
+    def residual(z: Array) -> Array:
+        x = _states(z * scale, azimuths, ratio)
+        acc = turbine.rhs(x, wind, vertical_shear, horizontal_shear, pitch)[8:].mean(axis=1)
+        return np.array([acc[0], acc[1], acc[2:5].mean() / 50, acc[5] / 50, acc[6], acc[7] / ratio])
+
+    # from the fastest rotation down, so that the point right of the power maximum is found, not the stalled one
+    for tip_speed_ratio in (7.5, 9.0, 6.0, 5.0, 10.5, 4.0, 3.0, 12.0):
+        start = np.array([1.0, -0.5, wind * 0.35, 0.1, 2.0, tip_speed_ratio * wind / p["radius"]])
+        found = root(residual, start, tol=1e-11)
+        if found.success and np.abs(found.fun).max() < 1e-6 and found.x[5] > 0.02:
+            return _states(found.x * scale, np.array([azimuth]), ratio)[:, 0]
+    raise InputError(
+        f"{turbine.name} has no steady rotation at {wind:g} m/s and {np.degrees(pitch):g} deg pitch; give `initial` explicitly"
+    )
+
+
+def _multiblade(azimuth: float, speed: float) -> tuple[Array, Array, Array]:
+    """T, dT/dt, d2T/dt2 (8, 8): blade flaps from their mean, cosine and sine parts (Coleman's transformation)."""
+    psi = azimuth + np.arange(3) * 2 * np.pi / 3
+    parts = [np.column_stack([np.ones(3), np.cos(psi), np.sin(psi)])]
+    parts.append(speed * np.column_stack([np.zeros(3), -np.sin(psi), np.cos(psi)]))
+    parts.append(-(speed**2) * np.column_stack([np.zeros(3), np.cos(psi), np.sin(psi)]))
+    out = []
+    for i, block in enumerate(parts):
+        t = np.eye(8) if i == 0 else np.zeros((8, 8))
+        t[2:5, 2:5] = block
+        out.append(t)
+    return out[0], out[1], out[2]
+
+
+def linearised(turbine: Turbine, wind: float, pitch: float = 0.0) -> Array:
+    """(16, 16) state matrix about the operating point in multiblade coordinates, averaged over the azimuth."""
+    base = operating_point(turbine, wind, 0.0, 0.0, 0.0, pitch)
+    ratio, speed = turbine.parameters["g_ratio"], base[14]
+    total = np.zeros((16, 16))
+    delta = np.array([1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-4, 1e-6, 1e-4] * 2)
+    for azimuth in np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
+        x = base.copy()
+        x[6] += azimuth
+        x[7] += ratio * azimuth
+        shifts = np.concatenate([np.diag(delta), -np.diag(delta)], axis=1)
+        acc = turbine.rhs(x[:, None] + shifts, wind, pitch=pitch)[8:]
+        jacobian = (acc[:, :16] - acc[:, 16:]) / (2 * delta)
+        k, d = jacobian[:, :8], jacobian[:, 8:]
+        t, t1, t2 = _multiblade(azimuth, speed)
+        inverse = np.linalg.inv(t)
+        block = np.zeros((16, 16))
+        block[:8, 8:] = np.eye(8)
+        block[8:, :8] = inverse @ (k @ t + d @ t1 - t2)
+        block[8:, 8:] = inverse @ (d @ t - 2 * t1)
+        total += block / AZIMUTHS
+    return total
+
+
+def natural_frequencies(turbine: Turbine, wind: float, pitch: float) -> list[tuple[str, float, float]]:
+    """See Turbine.natural_frequencies."""
+    p = turbine.parameters
+    values, vectors = np.linalg.eig(linearised(turbine, wind, pitch))
+    flap = np.sqrt(p["b_fxfx"] + p["b_fyfy"])
+    tower = np.sqrt(p["t_maa"] + p["n_m"] + p["h_m"] + 3 * p["b_m"])
+    rotor = np.sqrt(3 * p["b_m2"] + p["h_ixx"])
+    weight = np.array(
+        [tower, tower, np.sqrt(3) * flap, np.sqrt(1.5) * flap, np.sqrt(1.5) * flap,
+         np.sqrt(3 * (p["b_exex"] + p["b_eyey"])), rotor, np.sqrt(p["g_i"])]
+    )  # fmt: skip
+    modes = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value.imag > 2 * np.pi * 0.05:
+            share = (np.abs(vector[8:]) * weight) ** 2
+            share[6:8] = share[6:8].sum() / 2
+            modes.append((value.imag / (2 * np.pi), -value.real / abs(value), share))
+    modes.sort(key=lambda m: m[0])
+    return [
+        (name, f, damping) for name, (f, damping, _) in zip(_names([m[2] for m in modes]), modes, strict=True)
+    ]
+
+
+def _names(shares: list[Array]) -> list[str]:
+    """Names by the coordinates with the largest kinetic energy; the two cyclic flap modes by their order."""
+    kinds = (
+        "tower fore-aft",
+        "tower side-side",
+        "flap collective",
+        "flap cyclic",
+        "flap cyclic",
+        "drivetrain and collective edge",
+    )
+    groups = [[0], [1], [2], [3, 4], [], [5, 6, 7]]
+    raw = []
+    for share in shares:
+        raw.append(kinds[int(np.argmax([sum(share[i] for i in g) for g in groups]))])
+    out = []
+    for i, name in enumerate(raw):
+        same = [j for j, other in enumerate(raw) if other == name]
+        if name == "flap cyclic":
+            name = "flap regressing" if i == same[0] else "flap progressing"
+        elif len(same) > 1:
+            name = f"{name} {same.index(i) + 1}"
+        out.append(name)
+    return out

@@ -1,0 +1,156 @@
+"""A turbine ready to simulate: parameters, tables, and the compiled right-hand side."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fatigue_runner.errors import InputError
+from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters, read_turbine_file
+from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class KernelData:
+    """What the kernels read for one turbine at one pitch."""
+
+    constants: Array
+    tables: Array  # of the equations
+    load_tables: Array
+    cells: int
+
+
+@dataclass(frozen=True, eq=False)
+class Turbine:
+    """One turbine of the type T2B1i1cG. `parameters` by `equations.PARAMETERS` [SI], at zero pitch."""
+
+    name: str
+    parameters: Mapping[str, float]
+    tables: AeroTables
+    description: str = ""
+
+    @property
+    def hash(self) -> str:
+        """SHA-256 of parameters, tables and interpolation: what logs, correctors and reports are bound to."""
+        return _hash(self)
+
+    def kernel_data(self, pitch: float = 0.0) -> KernelData:
+        """Constants and table cells for the kernels; pitch [rad], positive to feather."""
+        return _kernel_data(self, float(pitch))
+
+    def rhs(
+        self,
+        state: ArrayLike,
+        wind: ArrayLike,
+        vertical_shear: ArrayLike = 0.0,
+        horizontal_shear: ArrayLike = 0.0,
+        pitch: float = 0.0,
+    ) -> Array:
+        """Time derivative of the state; (16,) or (16, n) -> the same shape.
+
+        wind [m/s], shears [-]: numbers or (n,); pitch [rad]. Raises InputError for another shape.
+        """
+        from fatigue_runner.turbine.lanes import evaluate
+
+        x = np.asarray(state, float)
+        if x.ndim not in (1, 2) or x.shape[0] != 16:
+            raise InputError(f"state must have shape (16,) or (16, n), got {x.shape}")
+        columns = x.reshape(16, -1)
+        p = np.stack(
+            [
+                np.broadcast_to(np.asarray(s, float), columns.shape[1])
+                for s in (wind, vertical_shear, horizontal_shear)
+            ]
+        )
+        return evaluate(self.kernel_data(pitch), columns, p)[0].reshape(x.shape)
+
+    def loads(self, state: ArrayLike, wind: ArrayLike, pitch: float = 0.0) -> dict[str, Array]:
+        """Load channels [SI] for states (n, 16) and wind signals (n, 3), the accelerations being those of the equations."""
+        from fatigue_runner.turbine.lanes import load_channels
+
+        return load_channels(self.kernel_data(pitch), np.asarray(state, float), np.asarray(wind, float))
+
+    def operating_point(
+        self,
+        wind: float,
+        vertical_shear: float = 0.0,
+        horizontal_shear: float = 0.0,
+        azimuth: float = 0.0,
+        pitch: float = 0.0,
+    ) -> Array:
+        """(16,) state at which the accelerations vanish in the mean over a revolution; azimuth and pitch [rad].
+
+        Raises InputError where the turbine has no steady rotation at this wind and pitch.
+        """
+        from fatigue_runner.turbine.steady import operating_point
+
+        return operating_point(self, wind, vertical_shear, horizontal_shear, azimuth, pitch)
+
+    def natural_frequencies(self, wind: float, pitch: float = 0.0) -> list[tuple[str, float, float]]:
+        """(name, damped frequency [Hz], damping ratio) of the oscillating modes at the operating point, rising."""
+        from fatigue_runner.turbine.steady import natural_frequencies
+
+        return natural_frequencies(self, wind, pitch)
+
+
+@lru_cache(maxsize=64)
+def _hash(turbine: Turbine) -> str:
+    digest = hashlib.sha256()
+    for name, value in sorted(turbine.parameters.items()):
+        digest.update(f"{name}={value.hex()};".encode())
+    digest.update(turbine.tables.interpolation.encode())
+    for values in (turbine.tables.tip_speed_ratio, turbine.tables.pitch):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    for name in sorted(turbine.tables.coefficients):
+        digest.update(name.encode() + np.ascontiguousarray(turbine.tables.coefficients[name]).tobytes())
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=256)
+def _kernel_data(turbine: Turbine, pitch: float) -> KernelData:
+    from fatigue_runner.turbine.generated import kernel
+
+    turned = at_pitch(turbine.parameters, pitch)
+    return KernelData(
+        constants=kernel.constants(turned),
+        tables=turbine.tables.cells(pitch, kernel.TABLES[: kernel.EQUATION_TABLES]),
+        load_tables=turbine.tables.cells(pitch, kernel.TABLES),
+        cells=len(turbine.tables.tip_speed_ratio) - 1,
+    )
+
+
+def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
+    """A turbine by shipped name (`nrel5mw`, `t2b1i1cg`), by the path of a turbine YAML, or from a mapping.
+
+    A mapping is either a turbine file's content, or a full parameter set: `parameters` (equations.PARAMETERS) and `tables`
+    (tip_speed_ratio, pitch_deg, coefficients), with `interpolation: cubic | bilinear`.
+    Raises InputError naming what is missing or wrong.
+    """
+    data = dict(source) if isinstance(source, Mapping) else read_turbine_file(str(source))
+    name = str(data.get("name", "unnamed"))
+    if "parameters" in data:
+        if "tables" not in data:
+            raise InputError(f"turbine {name}: a full parameter set needs `tables` beside `parameters`")
+        interpolation = str(data.get("interpolation", "cubic"))
+        return Turbine(
+            name,
+            checked(data["parameters"]),
+            tables_from_mapping(data["tables"], interpolation),
+            str(data.get("description", "")),
+        )
+    parameters = equation_parameters(data)
+    aero = data.get("aerodynamics", {})
+    if "tables" not in aero:
+        raise InputError(f"turbine {name}: aerodynamics needs `tables`, the npz of coefficients")
+    path = Path(str(data.get("folder", "."))) / str(aero["tables"])
+    tables = read_tables(path, str(aero.get("interpolation", "cubic")))
+    return Turbine(name, parameters, tables, str(data.get("description", "")))
