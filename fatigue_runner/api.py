@@ -1,0 +1,79 @@
+"""What `import fatigue_runner as fr` offers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fatigue_runner.campaign import run_campaign
+from fatigue_runner.campaign.initial import initial_state
+from fatigue_runner.campaign.spec import INITIAL_STATES
+from fatigue_runner.channels import STATE_NAMES
+from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.fatigue import damage_equivalent_load, rainflow
+from fatigue_runner.turbine import load_turbine
+from fatigue_runner.wind import ConstantWind, SeriesWind, StepWind, TurbulentWind, WindSource
+
+if TYPE_CHECKING:
+    from fatigue_runner.trajectory import Trajectory
+
+__all__ = [
+    "ConstantWind",
+    "SeriesWind",
+    "StepWind",
+    "TurbulentWind",
+    "damage_equivalent_load",
+    "load_turbine",
+    "rainflow",
+    "run_campaign",
+    "simulate",
+]
+
+
+def simulate(
+    turbine: Any,
+    wind: WindSource | float,
+    method: str = "rk4",
+    step: float = 0.01,
+    duration: float = 60.0,
+    initial: str | Any = "operating-point",
+    output_step: float | None = None,
+    pitch: float = 0.0,
+) -> Trajectory:
+    """Simulate one case and return its trajectory.
+
+    turbine: of `load_turbine`, or a name for it; wind: a wind source, or a constant speed [m/s]; step,
+    duration [s]; initial: "operating-point", "paper", "paper-spinning" or a state (16,); output_step [s]:
+    None samples every step, else the solution is interpolated; pitch [rad]. A case that diverges ends early:
+    see `diverged_at`. Raises InputError for an unknown method or turbine, a step that is not positive and a
+    malformed state.
+    """
+    from fatigue_runner.integrators import METHODS, simulate_block
+
+    if isinstance(turbine, str):
+        turbine = load_turbine(turbine)
+    if isinstance(wind, int | float):
+        wind = ConstantWind(float(wind))
+    if method not in METHODS:
+        raise InputError(f"unknown method {method!r}{did_you_mean(method, METHODS)}")
+    for name, value in (("step", step), ("duration", duration), ("output_step", output_step)):
+        if value is not None and not value > 0:
+            raise InputError(f"{name} must be above 0 s, got {value!r}")
+    start = _state(turbine, initial, wind, pitch)
+    return simulate_block(turbine, method, step, [wind], start[None, :], duration, output_step, pitch=pitch)[
+        0
+    ]
+
+
+def _state(turbine: Any, initial: Any, wind: WindSource, pitch: float) -> np.ndarray:
+    if isinstance(initial, str):
+        if initial not in INITIAL_STATES:
+            raise InputError(f"unknown initial state {initial!r}{did_you_mean(initial, INITIAL_STATES)}")
+        return initial_state(turbine, initial, wind, pitch)
+    state = np.asarray(initial, dtype=np.float64)
+    if state.shape != (len(STATE_NAMES),) or not np.isfinite(state).all():
+        raise InputError(
+            f"initial must be a state of {len(STATE_NAMES)} finite numbers, got shape {state.shape}"
+        )
+    return state

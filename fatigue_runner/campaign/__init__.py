@@ -1,0 +1,10 @@
+"""What is run: a campaign file becomes cases, one wind times one integrator each.
+
+Blocks of cases go to the lane kernel on a pool of workers; every finished case becomes a record, a log and a
+row of the results table. A run folder can be resumed.
+"""
+
+from fatigue_runner.campaign.results import Results
+from fatigue_runner.campaign.run import CampaignInterrupted, run_campaign
+
+__all__ = ["CampaignInterrupted", "Results", "run_campaign"]

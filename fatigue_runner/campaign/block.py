@@ -1,0 +1,198 @@
+"""What a worker does: one block of winds, first with the reference, then with every integrator."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.campaign.cases import Case, Integration
+from fatigue_runner.campaign.evaluate import (
+    DESCRIPTION,
+    STATISTICS,
+    Evaluated,
+    evaluate,
+    failed_row,
+    make_row,
+)
+from fatigue_runner.campaign.spec import Campaign
+from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What all blocks of a campaign share; travels to the workers."""
+
+    campaign: Campaign
+    turbine: str  # name or path, for `load_turbine`
+    turbine_hash: str
+    logs: Path
+    metadata: dict[str, str] = field(default_factory=dict)  # of every log's `run` record
+    attachments: dict[str, bytes] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One block: the cases to run, the references of their winds, the winds' states (16,) at t = 0 by id.
+
+    logged: {case id: record} of the cases whose trajectory stands in a log already, so that it is read, not
+    simulated.
+    """
+
+    setup: Setup
+    cases: list[Case]
+    references: list[Case]
+    initial: dict[str, np.ndarray]
+    logged: dict[str, dict[str, Any]]
+
+
+def run_block(job: Job) -> list[dict[str, Any]]:
+    """Simulate, evaluate and log the cases of a block; returns their records for `cases.jsonl`.
+
+    No exception of one integrator or case ends the others: it becomes a row with the status `failed`.
+    """
+    winds = {case.wind: _wind(case) for case in [*job.references, *job.cases]}
+    references: dict[Any, Evaluated | None] = {}
+    wanted = {case.id for case in job.cases}
+    records = []
+    for integration, cases in _by_integration([*job.references, *job.cases]).items():
+        for case, outcome in zip(cases, _trajectories(job, integration, cases, winds), strict=True):
+            wind = winds[case.wind]
+            reference = references.get(case.wind)
+            try:
+                if isinstance(outcome, Exception):
+                    raise outcome
+                own = evaluate(outcome, job.setup.campaign)
+                if integration.is_reference:
+                    references[case.wind] = own if outcome.diverged_at is None else None
+                if case.id in wanted:
+                    records.append(_finish(job, case, wind, outcome, own, reference))
+            except Exception as error:  # one case's trouble (a full disk, a bad wind) must not end the others
+                if case.id in wanted:
+                    source = None if isinstance(wind, Exception) else wind
+                    records.append(_record(case, failed_row(case, source, error, job.setup.campaign), 0))
+    return records
+
+
+def _by_integration(cases: Iterable[Case]) -> dict[Integration, list[Case]]:
+    """Cases grouped by integrator, the reference first, each case once."""
+    groups: dict[Integration, dict[str, Case]] = {}
+    for case in cases:
+        groups.setdefault(case.integration, {})[case.id] = case
+    return {integration: list(group.values()) for integration, group in groups.items()}
+
+
+def _wind(case: Case) -> Any:
+    try:
+        return case.wind.build()
+    except FatigueRunnerError as error:
+        return error
+
+
+def _trajectories(
+    job: Job, integration: Integration, cases: Sequence[Case], winds: dict[Any, Any]
+) -> list[Trajectory | Exception]:
+    """Every case's trajectory: from its log where that is complete, the others in one call of the kernel."""
+    outcomes: dict[str, Trajectory | Exception] = {}
+    for case in cases:
+        if isinstance(winds[case.wind], Exception):
+            outcomes[case.id] = winds[case.wind]
+        elif case.id in job.logged:
+            found = _read(job, case)
+            if found is not None:
+                outcomes[case.id] = found
+    missing = [case for case in cases if case.id not in outcomes]
+    if missing:
+        try:
+            initial = np.stack([job.initial[case.wind.id] for case in missing])
+            simulated = simulate(job.setup, integration, [winds[case.wind] for case in missing], initial)
+            outcomes |= {case.id: t for case, t in zip(missing, simulated, strict=True)}
+        except Exception as error:  # becomes the row of each of these cases
+            outcomes |= dict.fromkeys((case.id for case in missing), error)
+    return [outcomes[case.id] for case in cases]
+
+
+def _read(job: Job, case: Case) -> Trajectory | None:
+    """The trajectory in a case's log; None where it cannot be read, so that the case is simulated again."""
+    from fatigue_runner.logbook import read_log
+
+    row = job.logged[case.id]["row"]
+    try:
+        log = read_log(job.setup.logs / f"{case.id}.mcap")
+    except (FatigueRunnerError, OSError):
+        return None
+    return Trajectory(
+        log.time,
+        log.state,
+        log.wind,
+        log.loads,
+        log.accepted,
+        log.discrepancy,
+        log.threshold,
+        log.local_error,
+        **{name: row[name] for name in STATISTICS},
+    )
+
+
+def simulate(
+    setup: Setup, integration: Integration, winds: Sequence[Any], initial: np.ndarray
+) -> list[Trajectory]:
+    """All winds of a block with one integrator, from the states (n, 16)."""
+    from fatigue_runner.integrators import simulate_block
+
+    campaign = setup.campaign
+    return simulate_block(
+        _turbine(setup.turbine, setup.turbine_hash),
+        integration.method,
+        integration.step,
+        list(winds),
+        initial,
+        campaign.duration,
+        1.0 / campaign.output_rate,
+        pitch=float(np.deg2rad(campaign.pitch)),
+    )
+
+
+@functools.lru_cache(maxsize=4)
+def _turbine(source: str, expected_hash: str) -> Any:
+    """The turbine, loaded once per worker; refused where it is not the one that the cases were made for."""
+    from fatigue_runner.turbine import load_turbine
+
+    turbine = load_turbine(source)
+    if turbine.hash != expected_hash:
+        raise FatigueRunnerError(
+            f"turbine {source} changed while the campaign ran, or differs on this worker; run it again"
+        )
+    return turbine
+
+
+def _finish(
+    job: Job, case: Case, wind: Any, trajectory: Trajectory, own: Evaluated, reference: Evaluated | None
+) -> dict[str, Any]:
+    """Write the log of a case and make its record."""
+    from fatigue_runner.logbook import write_log
+
+    campaign = job.setup.campaign
+    row = make_row(case, wind, trajectory, own, reference, campaign)
+    if not campaign.log.enabled:
+        return _record(case, row, 0)
+    path = job.setup.logs / f"{case.id}.mcap"
+    identity = {
+        **job.setup.metadata,
+        "case_id": case.id,
+        "case_hash": case.hash,
+        "wind": wind.name,
+        **{name: "" if row[name] is None else str(row[name]) for name in DESCRIPTION},
+    }
+    result = {name: str(value) for name, value in row.items() if value is not None}
+    write_log(path, trajectory, identity, job.setup.attachments, result, compression=campaign.log.compression)
+    return _record(case, row, path.stat().st_size)
+
+
+def _record(case: Case, row: dict[str, Any], log_bytes: int) -> dict[str, Any]:
+    return {"hash": case.hash, "simulation_hash": case.simulation_hash, "log_bytes": log_bytes, "row": row}

@@ -1,0 +1,151 @@
+"""One case's row of the results table: costs, errors against the reference, fatigue, statistics."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.campaign.cases import Case
+from fatigue_runner.campaign.results import columns, fatigue_keys, known
+from fatigue_runner.campaign.spec import Campaign
+from fatigue_runner.trajectory import Trajectory
+
+# What a log does not hold, so that a trajectory read back from it takes these from the record of its own run.
+STATISTICS = ("steps", "evaluations", "clamped_lookups", "wall_time", "diverged_at")
+
+# The columns that say what was simulated; a log carries them too.
+DESCRIPTION = (
+    *("wind_source", "wind_speed", "vertical_shear", "horizontal_shear", "turbulence_intensity", "seed"),
+    *("pitch_deg", "method", "step", "is_reference"),
+)
+
+
+@dataclass
+class Evaluated:
+    """A trajectory without its discarded start, and its DELs {(channel, exponent): value or None}."""
+
+    trajectory: Trajectory
+    loads: dict[tuple[str, float], float | None]
+
+
+def discarded(trajectory: Trajectory, discard: float) -> Trajectory:
+    """The trajectory from `discard` [s] on; status arrays stay whole, nothing reads them by time here."""
+    if discard <= 0.0:
+        return trajectory
+    first = int(np.searchsorted(trajectory.time, discard - 1e-9))
+    return dataclasses.replace(
+        trajectory,
+        time=trajectory.time[first:],
+        state=trajectory.state[first:],
+        wind=trajectory.wind[first:],
+        loads={name: series[first:] for name, series in trajectory.loads.items()},
+    )
+
+
+def evaluate(trajectory: Trajectory, campaign: Campaign) -> Evaluated:
+    """Count every fatigue channel once, all exponents on the same cycles; a diverged case has no loads."""
+    from fatigue_runner.fatigue import channel_fatigue
+
+    kept = discarded(trajectory, campaign.discard)
+    if trajectory.diverged_at is not None:
+        return Evaluated(kept, {})
+    fatigue = campaign.fatigue
+    loads: dict[tuple[str, float], float | None] = {}
+    for channel in fatigue.channels:
+        result = channel_fatigue(
+            kept.loads[channel], fatigue.wohler_exponents, kept.duration, fatigue.residue
+        )
+        loads |= {(channel, m): result.load(m) for m in fatigue.wohler_exponents}
+    return Evaluated(kept, loads)
+
+
+def make_row(
+    case: Case,
+    wind: Any,
+    trajectory: Trajectory,
+    own: Evaluated,
+    reference: Evaluated | None,
+    campaign: Campaign,
+) -> dict[str, Any]:
+    """The row of a case that ran, every column present, None where a figure is unknown.
+
+    wind: the case's wind source; reference: that of the same wind, None where there is none or it diverged.
+    """
+    row = empty_row(case, campaign) | describe(case, wind, campaign) | _costs(trajectory)
+    if trajectory.diverged_at is not None:
+        return row
+    row |= {f"del_{suffix}": own.loads[channel, m] for channel, m, suffix in _fatigue(campaign)}
+    row |= {
+        f"{name}_{channel}": function(series)
+        for channel, series in own.trajectory.loads.items()
+        for name, function in (("mean", np.mean), ("min", np.min), ("max", np.max))
+    }
+    if reference is not None and not case.integration.is_reference:
+        row |= _errors(own, reference, campaign)
+    return {name: known(row[name]) for name in row}
+
+
+def failed_row(case: Case, wind: Any, error: Exception, campaign: Campaign) -> dict[str, Any]:
+    """The row of a case that could not run or be written; the error's text says why."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    row = empty_row(case, campaign) | (describe(case, wind, campaign) if wind is not None else {})
+    return row | {"status": "failed", "error_message": text}
+
+
+def empty_row(case: Case, campaign: Campaign) -> dict[str, Any]:
+    """Every column, with what is known of a case before it runs."""
+    row: dict[str, Any] = dict.fromkeys(columns(campaign.fatigue.channels, campaign.fatigue.wohler_exponents))
+    return row | {
+        "case_id": case.id,
+        "method": case.integration.method,
+        "step": case.integration.step,
+        "is_reference": case.integration.is_reference,
+    }
+
+
+def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
+    """The columns that say which wind and which pitch [deg] it was."""
+    label = wind.label
+    names = ("vertical_shear", "horizontal_shear", "turbulence_intensity", "seed")
+    return {
+        "wind_source": case.wind.kind,
+        "wind_speed": known(label["wind_speed"]),
+        "pitch_deg": campaign.pitch,
+        **{name: known(label.get(name)) for name in names},
+    }
+
+
+def _fatigue(campaign: Campaign) -> list[tuple[str, float, str]]:
+    return fatigue_keys(campaign.fatigue.channels, campaign.fatigue.wohler_exponents)
+
+
+def _costs(trajectory: Trajectory) -> dict[str, Any]:
+    duration = trajectory.duration
+    guarded = np.isfinite(trajectory.threshold).any()
+    return {
+        "status": "done" if trajectory.diverged_at is None else "diverged",
+        "diverged_at": known(trajectory.diverged_at),
+        "duration": known(duration),
+        "steps": int(trajectory.steps),
+        "evaluations": int(trajectory.evaluations),
+        "evaluations_per_second": known(trajectory.evaluations / duration) if duration > 0 else None,
+        "wall_time": known(trajectory.wall_time),
+        "clamped_lookups": int(np.sum(trajectory.clamped_lookups)),
+        "acceptance_rate": known(np.mean(trajectory.accepted)) if guarded else None,
+    }
+
+
+def _errors(own: Evaluated, reference: Evaluated, campaign: Campaign) -> dict[str, Any]:
+    from fatigue_runner.accuracy import compare
+    from fatigue_runner.fatigue import damage_ratio, load_error
+
+    errors: dict[str, Any] = dict(compare(own.trajectory, reference.trajectory).to_dict())
+    for channel, m, suffix in _fatigue(campaign):
+        load, theirs = own.loads[channel, m], reference.loads[channel, m]
+        if load is not None and theirs is not None:
+            errors[f"del_error_{suffix}"] = load_error(load, theirs)
+            errors[f"damage_ratio_{suffix}"] = damage_ratio(load, theirs, m)
+    return errors

@@ -1,0 +1,35 @@
+"""Where a case starts: the operating point of its wind, or the paper's initial states."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.channels import STATE_NAMES
+
+
+def initial_state(turbine: Any, initial: str | Any, wind: Any, pitch: float = 0.0) -> np.ndarray:
+    """State (16,) at t = 0 in the order of `channels.STATES` for a wind source; pitch [rad].
+
+    `operating-point` is that of the wind's mean speed and shears. `paper` is the literal state of
+    arXiv:2504.05493: all zero but a rotor azimuth of pi/3, which leaves the generator 60 degrees behind and winds
+    the shaft up. `paper-spinning` is what was probably meant, since it fits the paper's figure: the rotor turns
+    at pi/3 rad/s, the generator with it. A sequence is the state itself.
+    Raises InputError where the turbine has no operating point at this wind.
+    """
+    if not isinstance(initial, str):
+        return np.array(initial, dtype=np.float64)
+    if initial == "operating-point":
+        label = wind.label
+        shears = label.get("vertical_shear") or 0.0, label.get("horizontal_shear") or 0.0
+        return np.asarray(turbine.operating_point(wind.mean_speed, *shears, pitch=pitch), dtype=np.float64)
+    state = np.zeros(len(STATE_NAMES))
+    state[STATE_NAMES.index("rotor_azimuth")] = math.pi / 3
+    if initial == "paper-spinning":
+        generator = turbine.parameters["g_ratio"] * math.pi / 3
+        state[STATE_NAMES.index("generator_azimuth")] = generator
+        state[STATE_NAMES.index("rotor_speed")] = math.pi / 3
+        state[STATE_NAMES.index("generator_speed")] = generator
+    return state

@@ -1,0 +1,105 @@
+"""From a campaign file to the work to be done, without writing or running anything."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.campaign import checks
+from fatigue_runner.campaign.block import Job, Setup
+from fatigue_runner.campaign.cases import RESULT_VERSION, Case, blocks, make_cases, wind_cases
+from fatigue_runner.campaign.source import Source, read_source
+from fatigue_runner.campaign.spec import Campaign, parse_campaign
+from fatigue_runner.campaign.store import Store
+
+# Winds per block: two widths of the lane kernel, so that a block costs seconds at most, which is what Ctrl-C
+# can lose.
+BLOCK_SIZE = 16
+
+
+@dataclass
+class Plan:
+    """A checked campaign: its cases, and each wind's grid [s], which says what may share a block."""
+
+    campaign: Campaign
+    source: Source
+    turbine: Any
+    cases: list[Case]
+    cell_keys: dict[str, float | None]  # by wind id
+    initial: dict[str, np.ndarray]  # by wind id
+
+    @property
+    def turbine_source(self) -> str:
+        """What a worker gives to `load_turbine`."""
+        return checks.turbine_source(self.campaign, self.source)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What a run folder of this campaign must have in common with it."""
+        common = self.campaign.model_dump(include={"name", "duration", "output_rate", "initial", "pitch"})
+        return {"version": RESULT_VERSION, "turbine_hash": self.turbine.hash, **common}
+
+    def jobs(self, store: Store, setup: Setup, workers: int) -> list[Job]:
+        """The blocks of all cases that are not finished in the store, with the references that they need."""
+        pending: dict[str, list[Case]] = {}
+        references: dict[str, Case] = {}
+        for case in self.cases:
+            if case.integration.is_reference:
+                references[case.wind.id] = case
+            if store.finished(case, self.campaign.log.enabled) is None:
+                pending.setdefault(case.wind.id, []).append(case)
+        keys = [self.cell_keys[wind] for wind in pending]
+        jobs = []
+        for winds in blocks(list(pending), keys, BLOCK_SIZE, workers):
+            needed = [references[wind] for wind in winds if wind in references]
+            cases = [case for wind in winds for case in pending[wind]]
+            found = {case.id: store.logged(case) for case in [*needed, *cases]}
+            logged = {case_id: record for case_id, record in found.items() if record is not None}
+            initial = {wind: self.initial[wind] for wind in winds}
+            jobs.append(Job(setup, cases, needed, initial, logged))
+        return jobs
+
+
+def make_plan(campaign: str | Path | Mapping[str, Any]) -> Plan:
+    """Read, validate and expand a campaign file or mapping. Raises InputError with "file:line"."""
+    source = read_source(campaign)
+    spec = parse_campaign(source)
+    turbine = checks.load_turbine(spec, source)
+    checks.check_integrators(spec, turbine, source)
+    winds = wind_cases(spec.wind, spec.duration, turbine, source)
+    built = checks.build_winds(winds, spec, source)
+    keys = {case.id: wind.cell_key for case, wind in zip(winds, built, strict=True)}
+    initial = checks.initial_states(winds, built, spec, turbine, source)
+    return Plan(spec, source, turbine, make_cases(spec, winds, turbine.hash), keys, initial)
+
+
+def resolved_yaml(plan: Plan) -> str:
+    """The campaign with every default written out, as YAML that can be run again from anywhere."""
+    from ruamel.yaml import YAML
+
+    data = plan.campaign.model_dump(exclude={"wind", "integrators", "reference"})
+    data["turbine"] = plan.turbine_source
+    wind = plan.campaign.wind.model_dump(exclude_unset=True, exclude_none=True)
+    if "files" in wind:
+        wind["files"] = [str(checks.resolve(plan.source, name)) for name in wind["files"]]
+    data["wind"] = _without_none({"type": plan.campaign.wind.type, **wind})
+    data["integrators"] = [_without_none(item.model_dump()) for item in plan.campaign.integrators]
+    data["reference"] = None if plan.campaign.reference is None else plan.campaign.reference.model_dump()
+    text = io.StringIO()
+    text.write("# The campaign of this run folder, with every default written out.\n")
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.default_flow_style = None
+    yaml.dump(data, text)
+    return text.getvalue()
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list) else value

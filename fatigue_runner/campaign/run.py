@@ -1,0 +1,133 @@
+"""Run a campaign: plan, simulate what is not finished, write the results table and the report."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fatigue_runner.campaign.block import Setup, run_block
+from fatigue_runner.campaign.plan import Plan, make_plan, resolved_yaml
+from fatigue_runner.campaign.pool import run_jobs
+from fatigue_runner.campaign.results import Results, columns
+from fatigue_runner.campaign.store import Store
+from fatigue_runner.errors import FatigueRunnerError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+class CampaignInterrupted(FatigueRunnerError):
+    """Ctrl-C: what is finished is kept."""
+
+    exit_code = 130
+
+
+def run_campaign(
+    campaign: str | Path | Mapping[str, Any],
+    out: str | Path | None = None,
+    *,
+    workers: int | None = None,
+    fresh: bool = False,
+    dask: str | None = None,
+    console: Console | None = None,
+) -> Results:
+    """Run a campaign file (or a mapping with its keys) and return the results table.
+
+    out: run folder, default `runs/<name>`; finished cases found there are kept, unless `fresh`. workers:
+    processes, default as the campaign says; dask: address of a scheduler instead. console: where progress is
+    shown; None shows nothing. Raises InputError before anything is written where the campaign or the folder
+    is wrong, and CampaignInterrupted on Ctrl-C.
+    """
+    from fatigue_runner.campaign.progress import Progress
+
+    started = time.perf_counter()
+    with Progress(console) as progress:
+        progress.say("reading the campaign")
+        plan = make_plan(campaign)
+        folder = Path(out) if out is not None else Path("runs") / plan.campaign.name
+        store = Store(folder, plan.identity, fresh)
+        simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress)
+        results = _collect(plan, store, simulated, time.perf_counter() - started)
+        results.write()
+        progress.say("writing the report")
+        from fatigue_runner.report import write_report
+
+        write_report(folder)
+    return results
+
+
+def _simulate(plan: Plan, store: Store, workers: int, dask: str | None, progress: Any) -> int:
+    """Run the cases that are not finished; returns how many there were."""
+    facts = about(plan)
+    text = resolved_yaml(plan)
+    setup = Setup(
+        plan.campaign,
+        plan.turbine_source,
+        plan.turbine.hash,
+        store.out.resolve() / "logs",
+        facts,
+        {"campaign.yaml": text.encode()},
+    )
+    store.open({"facts": facts, "campaign": plan.campaign.model_dump()}, text)
+    try:
+        jobs = plan.jobs(store, setup, workers)
+        pending = sum(len(job.cases) for job in jobs)
+        progress.begin(len(plan.cases), len(plan.cases) - pending)
+        if jobs:
+            _warm_up(plan, progress)
+        progress.say("running")
+        for records in run_jobs(run_block, jobs, workers, dask):
+            store.add(records)
+            progress.advance(records)
+        return pending
+    except KeyboardInterrupt:
+        done = sum(store.finished(case, plan.campaign.log.enabled) is not None for case in plan.cases)
+        raise CampaignInterrupted(
+            f"interrupted: {done} of {len(plan.cases)} cases are finished; the same command runs the rest"
+        ) from None
+    finally:
+        store.close()
+
+
+def _warm_up(plan: Plan, progress: Any) -> None:
+    """Compile the kernels here, once, so that the workers load them from the cache."""
+    from fatigue_runner import integrators
+
+    progress.say("compiling the kernels (first run only)")
+    integrators.warm_up()
+
+
+def _collect(plan: Plan, store: Store, simulated: int, wall_time: float) -> Results:
+    fatigue = plan.campaign.fatigue
+    return Results(
+        out=store.out,
+        columns=columns(fatigue.channels, fatigue.wohler_exponents),
+        rows=[store.records[case.id]["row"] for case in plan.cases],
+        simulated=simulated,
+        kept=len(plan.cases) - simulated,
+        wall_time=wall_time,
+    )
+
+
+def about(plan: Plan) -> dict[str, str]:
+    """What ran on what: the facts that logs and the run folder carry."""
+    names = ("fatigue-runner", "numpy", "numba", "scipy")
+    versions = [f"{name} {_version(name)}" for name in names]
+    return {
+        "campaign": plan.campaign.name,
+        "turbine": plan.turbine.name,
+        "turbine_hash": plan.turbine.hash,
+        "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
+        "machine": f"{platform.machine()}, {platform.system()}",
+    }
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "(not installed)"

@@ -1,0 +1,125 @@
+"""A campaign file as plain data that remembers on which line each value stood."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fatigue_runner.errors import InputError
+
+# Aliases (`&a`, `*a`) can nest into each other and grow without bound from a few bytes of text.
+MAX_VALUES = 100_000
+MAX_DEPTH = 32
+
+
+class Source:
+    """Plain `data` (dicts, lists, numbers, text) of a campaign, and `where(path)`: "file:line" of a value."""
+
+    def __init__(self, name: str, data: Any, text: str = "", folder: Path | None = None) -> None:
+        self.name = name
+        self.text = text
+        self.folder = folder or Path.cwd()
+        self._lines: dict[tuple[str | int, ...], int] = {(): 1}
+        self._values = 0
+        self.data = self._plain(data, ())
+
+    def line(self, path: tuple[str | int, ...]) -> int | None:
+        """Line (from 1) of the value at `path`, or of the nearest enclosing one; None where there is no file.
+
+        Elements of `path` that are not in the file (defaults, a single value where a list may stand) are
+        skipped.
+        """
+        if not self.text:
+            return None
+        known: tuple[str | int, ...] = ()
+        for key in path:
+            for spelling in (key, f"{key}s"):  # `steps` may stand for `step`
+                if (*known, spelling) in self._lines:
+                    known = (*known, spelling)
+                    break
+        return self._lines[known]
+
+    def where(self, path: tuple[str | int, ...] = ()) -> str:
+        """The place as a user reads it: `campaigns/sweep.yaml:14`."""
+        line = self.line(path)
+        return self.name if line is None else f"{self.name}:{line}"
+
+    def _plain(self, node: Any, path: tuple[str | int, ...]) -> Any:
+        self._values += 1
+        if self._values > MAX_VALUES or len(path) > MAX_DEPTH:
+            raise InputError(
+                f"{self.where(path[:1])}: too many or too deeply nested values; aliases (`*a`) multiply"
+            )
+        if isinstance(node, Mapping):
+            return {str(key): self._child(node, key, str(key), value, path) for key, value in node.items()}
+        if isinstance(node, list | tuple):
+            return [self._child(node, i, i, value, path) for i, value in enumerate(node)]
+        for plain in (bool, int, float, str):  # ruamel's scalars are subclasses that carry their formatting
+            if isinstance(node, plain):
+                return plain(node)
+        return node
+
+    def _child(self, node: Any, key: Any, name: str | int, value: Any, path: tuple[str | int, ...]) -> Any:
+        positions = getattr(getattr(node, "lc", None), "data", None) or {}
+        if key in positions:
+            self._lines[(*path, name)] = positions[key][0] + 1
+        return self._plain(value, (*path, name))
+
+
+def read_source(campaign: str | Path | Mapping[str, Any]) -> Source:
+    """Read a campaign YAML (1.2: `1e7` is a number, duplicate keys are refused) or take a mapping as it is.
+
+    Raises InputError for a missing or unreadable file and for text that is not YAML, with its line.
+    """
+    if isinstance(campaign, Mapping):
+        return Source("campaign", campaign)
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+    path = Path(campaign)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file{_nearby(path)}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path} is a folder; give the campaign's YAML file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as text: {error}") from None
+    try:
+        data = YAML(typ="rt").load(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = f"{path}:{mark.line + 1}" if mark else str(path)
+        raise InputError(f"{place}: {_yaml_problem(error)}") from None
+    except YAMLError as error:  # e.g. control characters: no mark
+        raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
+    except RecursionError:
+        raise InputError(f"{path}: not a campaign: its brackets nest too deeply") from None
+    if not isinstance(data, Mapping):
+        raise InputError(
+            f"{path}:1: a campaign is a mapping of keys (name, duration, wind, integrators, ...)"
+        )
+    return Source(str(path), data, text, path.resolve().parent)
+
+
+def _yaml_problem(error: Any) -> str:
+    """One sentence for a YAML error."""
+    from ruamel.yaml.constructor import DuplicateKeyError
+
+    problem = str(error.problem or error.context or "not valid YAML").strip()
+    if isinstance(error, DuplicateKeyError):
+        key = problem.split('"')[1] if '"' in problem else "?"
+        return f"key {key!r} is given twice in one section; keep one of the two"
+    return f"not valid YAML: {problem}"
+
+
+def _nearby(path: Path) -> str:
+    """The campaign files that stand where the missing one was looked for."""
+    folder = path.parent
+    names = sorted(str(folder / p.name) for p in folder.glob("*.y*ml")) if folder.is_dir() else []
+    if not names:
+        return ""
+    from fatigue_runner.errors import did_you_mean
+
+    return did_you_mean(str(path), names)

@@ -1,0 +1,252 @@
+"""The campaign file: its keys, their units and defaults, and what is refused.
+
+name            names the run folder; letters, digits, `.`, `_`, `-`
+turbine         `nrel5mw` (default), `t2b1i1cg` (the paper's: no tilt, no cone) or the path of a turbine YAML
+duration        simulated time of every case [s]
+output_rate     samples per second [Hz] of what is counted, compared and logged (default 50), at any step
+initial         state at t = 0: `operating-point` (default), `paper`, `paper-spinning`, or 16 numbers
+pitch           blade pitch [deg], the same for all cases (default 0)
+discard         seconds dropped from the start before statistics, fatigue and errors (default 0)
+workers         parallel processes (default 2; `--workers` overrides it)
+
+wind.type              `constant` (default), `turbulent` or `file`
+wind.speeds            mean hub-height speeds [m/s]: a sweep, see below
+wind.vertical_shear    linear shear kappa_v [-], v(z) = v (1 + kappa_v z/R); a sweep (default 0)
+wind.horizontal_shear  linear shear kappa_h [-]; a sweep (default 0)
+wind.shear_exponent    power-law exponent alpha instead of `vertical_shear`: kappa_v = alpha R/H
+wind.intensity         turbulent: sigma_1 / mean speed at hub height [-], e.g. 0.14
+wind.turbulence_class  turbulent: `A`, `B` or `C`, the IEC normal turbulence model, instead of `intensity`
+wind.seeds             turbulent: how many seeds per speed (default 1; no two speeds share one), or a list
+wind.files             file: one path or a list, relative to the campaign file
+
+integrators     list of {method, step}: `step` [s] is a sweep, and every method meets every wind
+reference       {method, step}: what the integrators are measured against (default rk7 at 0.001 s); or null
+
+fatigue.channels          load channels that are counted (default: blade 1 root and tower base, two each)
+fatigue.wohler_exponents  default [3, 4, 5, 10, 12]
+fatigue.residue           what the rainflow residue counts as: `half` (default, ASTM), `full`, `drop`
+
+log.enabled      one MCAP file per case in logs/ (default true)
+log.compression  `zstd` (default), `lz4` or `none`
+
+A sweep is a number, a list of numbers, {start, stop, step}, {start, stop, count} (both ends included),
+{random: {count, low, high, seed}}, or a list of such pieces.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PlainValidator,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from fatigue_runner.campaign.section import Section, input_error, problem
+from fatigue_runner.campaign.source import Source
+from fatigue_runner.campaign.sweep import Piece, Sweep, as_list, check_not_empty, expand
+from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
+from fatigue_runner.errors import did_you_mean
+
+INITIAL_STATES = ("operating-point", "paper", "paper-spinning")
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
+
+
+def _initial_state(value: Any) -> str | list[float]:
+    if isinstance(value, str):
+        if value not in INITIAL_STATES:
+            hint = did_you_mean(value, INITIAL_STATES)
+            raise problem(f"{value!r} is not known{hint}, or give {len(STATE_NAMES)} numbers")
+        return value
+    if not isinstance(value, list) or len(value) != len(STATE_NAMES) or not all(map(_is_number, value)):
+        raise problem(
+            f"must be one of {', '.join(INITIAL_STATES)}, or {len(STATE_NAMES)} finite numbers: "
+            f"{', '.join(STATE_NAMES)}"
+        )
+    return [float(number) for number in value]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _positive_steps(pieces: list[Piece]) -> list[Piece]:
+    for value, _ in expand(pieces):
+        if value <= 0:
+            raise problem(f"must be above 0 s; got {value:g}")
+    return pieces
+
+
+def _seeds(value: Any) -> int | list[int]:
+    if isinstance(value, list):
+        if not value or not all(type(seed) is int and seed >= 0 for seed in value):
+            raise problem(f"must be a count or a list of whole numbers, 0 or more; got {value!r:.60}")
+        return list(dict.fromkeys(value))
+    if type(value) is not int or not 1 <= value <= 999:
+        raise problem(f"must be a count from 1 to 999 or a list of seeds; got {value!r:.60}")
+    return value
+
+
+class Wind(Section):
+    """What blows: every combination of speed, shear and seed is one wind."""
+
+    type: Literal["constant", "turbulent", "file"] = "constant"
+    speeds: Sweep = Field(default=[])
+    vertical_shear: Sweep = Field(default=[0.0])
+    horizontal_shear: Sweep = Field(default=[0.0])
+    shear_exponent: float | None = Field(default=None, ge=-1, le=1)
+    intensity: float | None = Field(default=None, gt=0, le=1)
+    turbulence_class: Literal["A", "B", "C"] | None = None
+    seeds: Annotated[int | list[int], PlainValidator(_seeds)] = 1
+    files: Annotated[list[str], BeforeValidator(check_not_empty), BeforeValidator(as_list)] = Field(
+        default=[]
+    )
+
+    @model_validator(mode="after")
+    def _keys_of_its_type(self) -> Wind:
+        allowed = {
+            "constant": {"speeds", "vertical_shear", "horizontal_shear", "shear_exponent"},
+            "turbulent": {
+                "speeds",
+                "horizontal_shear",
+                "shear_exponent",
+                "intensity",
+                "turbulence_class",
+                "seeds",
+            },
+            "file": {"files"},
+        }[self.type]
+        given = self.model_fields_set - {"type"}
+        for key in sorted(given - allowed):
+            raise problem(
+                f"means nothing for wind of type {self.type!r}; remove it or change `type`", key=key
+            )
+        if {"vertical_shear", "shear_exponent"} <= given:
+            raise problem("stands beside vertical_shear; give one of the two", key="shear_exponent")
+        if self.type == "turbulent" and (self.intensity is None) == (self.turbulence_class is None):
+            raise problem(
+                "of type 'turbulent' needs either `intensity` (e.g. 0.14) or `turbulence_class` (A, B, C)"
+            )
+        needed = "files" if self.type == "file" else "speeds"
+        if needed not in given:
+            raise problem(f"needs the key {needed!r}")
+        return self
+
+    def seeds_at(self, speed: float) -> list[int]:
+        """The seeds of the winds of a mean speed [m/s].
+
+        A count gives seeds that no other speed has, because winds of one seed share their phases at all
+        speeds; they depend on nothing but the speed, so that more speeds or more seeds leave the others as
+        they are. A list is taken literally.
+        """
+        if isinstance(self.seeds, list):
+            return self.seeds
+        return [1000 * round(100 * speed) + number for number in range(1, self.seeds + 1)]
+
+
+class Integrator(Section):
+    """One method and the steps [s] it runs at; `steps` may be written for `step`."""
+
+    synonyms: ClassVar = {"steps": "step"}
+
+    method: str
+    step: Annotated[Sweep, AfterValidator(_positive_steps)]
+
+
+class Reference(Section):
+    """The integrator that the others are measured against."""
+
+    method: str = "rk7"
+    step: float = Field(default=0.001, gt=0)
+
+
+Exponent = Annotated[float, Field(ge=1, le=50)]
+
+
+class Fatigue(Section):
+    """What is counted and how."""
+
+    channels: Annotated[list[str], BeforeValidator(check_not_empty)] = Field(default=[*FATIGUE_CHANNELS])
+    wohler_exponents: Annotated[list[Exponent], BeforeValidator(check_not_empty)] = Field(
+        default=[3.0, 4.0, 5.0, 10.0, 12.0]
+    )
+    residue: Literal["half", "full", "drop"] = "half"
+
+    @field_validator("channels")
+    @classmethod
+    def _channels_exist(cls, channels: list[str]) -> list[str]:
+        for name in channels:
+            if name not in LOAD_NAMES:
+                raise problem(f"{name!r} is no load channel{did_you_mean(name, LOAD_NAMES)}")
+        return list(dict.fromkeys(channels))
+
+
+class Log(Section):
+    """One MCAP file per case."""
+
+    enabled: bool = True
+    compression: Literal["zstd", "lz4", "none"] = "zstd"
+
+
+class Campaign(Section):
+    """A whole campaign file; see the module's text for every key."""
+
+    name: Annotated[str, Field(pattern=NAME_PATTERN)]
+    turbine: str = "nrel5mw"
+    duration: float = Field(gt=0, le=1e5)
+    output_rate: float = Field(default=50.0, gt=0, le=10_000)
+    initial: Annotated[str | list[float], PlainValidator(_initial_state)] = "operating-point"
+    pitch: float = 0.0
+    discard: float = Field(default=0.0, ge=0)
+    workers: int = Field(default=2, ge=1, le=1024)
+    wind: Wind
+    integrators: Annotated[list[Integrator], BeforeValidator(check_not_empty)]
+    reference: Reference | None = Reference()
+    fatigue: Fatigue = Fatigue()
+    log: Log = Log()
+
+    @model_validator(mode="after")
+    def _times_fit(self) -> Campaign:
+        samples = self.duration * self.output_rate
+        if samples < 2 or abs(samples - round(samples)) > 1e-6 * samples:
+            raise problem(
+                f"{self.duration:g} s at {self.output_rate:g} Hz is {samples:g} output intervals; "
+                "it must be a whole number of at least 2",
+                key="duration",
+            )
+        if self.discard > self.duration - 2 / self.output_rate:
+            raise problem(
+                f"{self.discard:g} s leaves nothing of the {self.duration:g} s; make it smaller",
+                key="discard",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _no_integrator_twice(self) -> Campaign:
+        seen = {(self.reference.method, self.reference.step): "the reference"} if self.reference else {}
+        for index, integrator in enumerate(self.integrators):
+            for step, _ in expand(integrator.step):
+                if step > self.duration:
+                    raise problem(f"step {step:g} s of {integrator.method} is longer than the whole case")
+                first = seen.setdefault((integrator.method, step), f"integrators[{index}]")
+                if first != f"integrators[{index}]":
+                    raise problem(
+                        f"{integrator.method} at {step * 1e3:g} ms is integrators[{index}] and also {first}; "
+                        "remove one",
+                        key="integrators",
+                    )
+        return self
+
+
+def parse_campaign(source: Source) -> Campaign:
+    """The validated campaign; raises InputError with one sentence and "file:line" per problem."""
+    try:
+        return Campaign.model_validate(source.data)
+    except ValidationError as error:
+        raise input_error(error, source) from None

@@ -1,0 +1,302 @@
+"""A campaign file means what it says; what is wrong in it is refused with file, line and the way out."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fatigue_runner.campaign.source import read_source
+from fatigue_runner.campaign.spec import Campaign, parse_campaign
+from fatigue_runner.campaign.sweep import Random, Range, expand
+from fatigue_runner.errors import InputError
+
+MINIMAL = """\
+name: sweep
+duration: 60
+wind:
+  speeds: 8
+integrators:
+  - {method: heun, step: 0.01}
+"""
+
+# Six lines that mean 200,000 values.
+ALIASES = "k0: &k0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"k{i}: &k{i} [{', '.join([f'*k{i - 1}'] * 10)}]\n" for i in range(1, 6)
+)
+
+
+def parse(folder: Path, text: str) -> Campaign:
+    path = folder / "sweep.yaml"
+    path.write_text(text)
+    return parse_campaign(read_source(path))
+
+
+def refusal(folder: Path, text: str) -> str:
+    """The message without the folder, so that it reads `sweep.yaml:4: ...`."""
+    with pytest.raises(InputError) as caught:
+        parse(folder, text)
+    assert caught.value.exit_code == 2
+    return str(caught.value).replace(f"{folder}/", "")
+
+
+def values(pieces) -> list[float]:
+    return [value for value, _ in expand(pieces)]
+
+
+def test_a_minimal_campaign_has_the_stated_defaults(tmp_path):
+    campaign = parse(tmp_path, MINIMAL)
+    assert (campaign.turbine, campaign.output_rate, campaign.initial) == ("nrel5mw", 50, "operating-point")
+    assert (campaign.workers, campaign.discard, campaign.pitch) == (2, 0, 0)
+    assert campaign.reference is not None and campaign.reference.method == "rk7"
+    assert campaign.reference.step == 0.001
+    assert campaign.fatigue.wohler_exponents == [3, 4, 5, 10, 12]
+    assert campaign.fatigue.residue == "half"
+    assert campaign.log.enabled
+
+
+def test_exponent_notation_is_a_number_as_in_yaml_1_2(tmp_path):
+    assert parse(tmp_path, MINIMAL.replace("60", "6e1")).duration == 60.0
+    assert parse(tmp_path, MINIMAL.replace("0.01", "1e-2")).integrators[0].step == [0.01]
+
+
+def test_step_may_be_a_number_or_a_list_and_spelled_steps(tmp_path):
+    one = parse(tmp_path, MINIMAL)
+    listed = parse(tmp_path, MINIMAL.replace("step: 0.01", "steps: [0.01, 0.02]"))
+    assert one.integrators[0].step == [0.01]
+    assert listed.integrators[0].step == [0.01, 0.02]
+
+
+# What is written in place of `line`, and the message.
+REFUSED = {
+    "unknown key": (
+        "  speeds: 8",
+        "  sped: 8",
+        "sweep.yaml:4: unknown key 'sped' in wind; did you mean 'speeds'?",
+    ),
+    "unknown key at the top": (
+        "duration: 60",
+        "duratoin: 60",
+        "unknown key 'duratoin'; did you mean 'duration'?",
+    ),
+    "unknown key in a list": (
+        "step: 0.01",
+        "stap: 0.01",
+        "sweep.yaml:6: unknown key 'stap' in integrators[0]",
+    ),
+    "missing key": ("name: sweep\n", "", "sweep.yaml:1: key 'name' is missing"),
+    "missing section": ("wind:\n  speeds: 8\n", "", "key 'wind' is missing"),
+    "no speeds": ("  speeds: 8", "  type: constant", "sweep.yaml:3: wind: needs the key 'speeds'"),
+    "duplicate key": ("duration: 60", "duration: 60\nname: b", "sweep.yaml:3: key 'name' is given twice"),
+    "negative step": (
+        "step: 0.01",
+        "step: -0.01",
+        "sweep.yaml:6: integrators[0].step: must be above 0 s; got -0.01",
+    ),
+    "zero step": ("step: 0.01", "step: [0.01, 0]", "must be above 0 s; got 0"),
+    "zero reference step": (
+        "name:",
+        "reference: {step: 0}\nname:",
+        "sweep.yaml:1: reference.step must be above 0",
+    ),
+    "step as text": (
+        "step: 0.01",
+        "step: 10ms",
+        "sweep.yaml:6: integrators[0].step must be a number; got '10ms'",
+    ),
+    "step is true": ("step: 0.01", "step: true", "integrators[0].step must be a number; got True"),
+    "step is not a number": ("step: 0.01", "step: .nan", "must be a finite number"),
+    "step longer than the case": (
+        "step: 0.01",
+        "step: 61",
+        "step 61 s of heun is longer than the whole case",
+    ),
+    "empty sweep": ("speeds: 8", "speeds: []", "sweep.yaml:4: wind.speeds: is an empty sweep"),
+    "backward range": (
+        "speeds: 8",
+        "speeds: {start: 9, stop: 8, step: 1}",
+        "so the sweep is empty; swap them",
+    ),
+    "range without spacing": ("speeds: 8", "speeds: {start: 7, stop: 8}", "give either `step` or `count`"),
+    "range of zero step": (
+        "speeds: 8",
+        "speeds: {start: 7, stop: 8, step: 0}",
+        "wind.speeds.step must be above 0",
+    ),
+    "huge range": ("speeds: 8", "speeds: {start: 1, stop: 9, step: 1e-9}", "holds more than 100000 values"),
+    "crowded random": (
+        "speeds: 8",
+        "speeds: {random: {count: 9, low: 8, high: 8, seed: 1}}",
+        "sweep.yaml:4: wind.speeds.random: 9 different values",
+    ),
+    "no integrators": ("  - {method: heun, step: 0.01}", "  []", "integrators: is an empty sweep"),
+    "integrator twice": (
+        "step: 0.01}",
+        "step: 0.01}\n  - {method: heun, step: [0.02, 0.01]}",
+        "heun at 10 ms is integrators[1] and also integrators[0]; remove one",
+    ),
+    "reference as integrator": (
+        "{method: heun, step: 0.01}",
+        "{method: rk7, step: 0.001}",
+        "and also the reference",
+    ),
+    "unknown channel": (
+        "name:",
+        "fatigue: {channels: [rotor_trust]}\nname:",
+        "'rotor_trust' is no load channel; did you mean 'rotor_thrust'?",
+    ),
+    "unknown residue": (
+        "name:",
+        "fatigue: {residue: halff}\nname:",
+        "'halff' is not known; did you mean 'half'?",
+    ),
+    "unknown initial": (
+        "name:",
+        "initial: operating\nname:",
+        "initial: 'operating' is not known; did you mean 'operating-point'?",
+    ),
+    "short state": ("name:", "initial: [0, 0]\nname:", "or 16 finite numbers: tower_fore_aft, "),
+    "zero workers": ("name:", "workers: 0\nname:", "sweep.yaml:1: workers must be at least 1; got 0"),
+    "fractional samples": (
+        "duration: 60",
+        "duration: 60.01",
+        "3000.5 output intervals; it must be a whole number",
+    ),
+    "all discarded": ("name:", "discard: 60\nname:", "discard: 60 s leaves nothing of the 60 s"),
+    "name with a slash": ("name: sweep", "name: ../sweep", "sweep.yaml:1: name "),
+    "seeds of constant wind": (
+        "speeds: 8",
+        "speeds: 8\n  seeds: 3",
+        "sweep.yaml:5: wind.seeds: means nothing",
+    ),
+    "turbulence of no strength": ("speeds: 8", "speeds: 8\n  type: turbulent", "needs either `intensity`"),
+    "two shears": (
+        "speeds: 8",
+        "speeds: 8\n  vertical_shear: 0.1\n  shear_exponent: 0.2",
+        "sweep.yaml:6: wind.shear_exponent: stands beside vertical_shear",
+    ),
+    "no mapping": (
+        "  - {method: heun, step: 0.01}",
+        "  - heun",
+        "integrators[0]: must be a section with the keys",
+    ),
+    "list for a file": (MINIMAL, "- 1\n", "sweep.yaml:1: a campaign is a mapping of keys"),
+    "empty file": (MINIMAL, "", "sweep.yaml:1: a campaign is a mapping of keys"),
+    "broken yaml": ("speeds: 8", "speeds: [8", "sweep.yaml:5: not valid YAML"),
+    "multiplying aliases": (MINIMAL, ALIASES, "sweep.yaml:5: too many or too deeply nested values"),
+}
+
+
+@pytest.mark.parametrize(("line", "instead", "message"), REFUSED.values(), ids=REFUSED.keys())
+def test_what_is_wrong_is_refused_with_its_place_and_the_way_out(tmp_path, line, instead, message):
+    assert line in MINIMAL
+    told = refusal(tmp_path, MINIMAL.replace(line, instead, 1))
+    assert message in told
+    assert told.startswith("sweep.yaml:")
+    assert "\n" not in told
+
+
+def test_all_problems_are_told_at_once_in_the_order_of_the_file(tmp_path):
+    told = refusal(
+        tmp_path, MINIMAL.replace("60", "-1").replace("0.01", "0").replace("speeds: 8", "speds: 8")
+    )
+    assert [line.split(" ")[0] for line in told.splitlines()] == [
+        "sweep.yaml:2:",
+        "sweep.yaml:4:",
+        "sweep.yaml:6:",
+    ]
+
+
+def test_a_missing_file_names_the_nearest_one(tmp_path):
+    (tmp_path / "sweep.yaml").write_text(MINIMAL)
+    with pytest.raises(InputError, match=r"sweeep\.yaml: no such file; did you mean .*sweep\.yaml"):
+        read_source(tmp_path / "sweeep.yaml")
+
+
+def test_a_folder_is_no_campaign(tmp_path):
+    with pytest.raises(InputError, match="is a folder"):
+        read_source(tmp_path)
+
+
+def test_brackets_without_end_are_no_campaign(tmp_path):
+    assert "nest too deeply" in refusal(tmp_path, "a: " + "[" * 400 + "]" * 400)
+
+
+def test_a_mapping_needs_no_file_and_its_errors_name_the_key():
+    with pytest.raises(InputError, match="campaign: unknown key 'sped' in wind; did you mean 'speeds'"):
+        parse_campaign(read_source({"name": "a", "duration": 1, "wind": {"sped": 8}, "integrators": []}))
+
+
+def test_a_range_holds_both_ends():
+    assert values([Range(start=5.0, stop=10.0, step=2.5)]) == [5.0, 7.5, 10.0]
+    assert values([Range(start=5.0, stop=10.0, count=3)]) == [5.0, 7.5, 10.0]
+    assert values([Range(start=8.0, stop=8.0, count=1)]) == [8.0]
+
+
+def test_a_range_is_free_of_rounding():
+    assert values([Range(start=5.0, stop=5.5, step=0.1)]) == [5.0, 5.1, 5.2, 5.3, 5.4, 5.5]
+
+
+def test_a_value_in_two_pieces_comes_once():
+    assert values([8.0, Range(start=7.0, stop=9.0, step=1.0)]) == [8.0, 7.0, 9.0]
+
+
+def test_random_speeds_are_these_on_every_machine():
+    # Random(1).random() gives 0.13436, 0.84743, 0.76377 in every version (docs.python.org, random).
+    speeds = values([Random.model_validate({"random": {"count": 3, "low": 5.0, "high": 10.0, "seed": 1}})])
+    assert speeds == [5.6718, 8.8189, 9.2372]
+
+
+def test_the_paper_mixture_of_speeds_can_be_written(tmp_path):
+    text = MINIMAL.replace(
+        "  speeds: 8",
+        "  speeds:\n    - random: {count: 150, low: 5, high: 10, seed: 1}\n"
+        "    - random: {count: 50, low: 10, high: 20, seed: 2}",
+    )
+    speeds = values(parse(tmp_path, text).wind.speeds)
+    assert len(speeds) == len(set(speeds)) == 200
+    assert sum(speed <= 10 for speed in speeds) == 150
+    assert max(speeds) > 15
+
+
+def test_a_count_of_seeds_gives_no_two_speeds_the_same_seed(tmp_path):
+    text = MINIMAL.replace(
+        "  speeds: 8", "  type: turbulent\n  speeds: [8, 10]\n  intensity: 0.1\n  seeds: 6"
+    )
+    wind = parse(tmp_path, text).wind
+    assert len({*wind.seeds_at(8.0), *wind.seeds_at(10.0)}) == 12
+    more = parse(tmp_path, text.replace("seeds: 6", "seeds: 9")).wind
+    assert more.seeds_at(8.0)[:6] == wind.seeds_at(8.0)
+
+
+@given(
+    start=st.floats(-50, 50),
+    length=st.floats(0, 50),
+    step=st.floats(0.01, 10),
+)
+def test_a_range_by_step_is_even_and_within_its_ends(start, length, step):
+    found = values([Range(start=start, stop=start + length, step=step)])
+    assert len(found) == math.floor(length / step + 1e-9) + 1 or math.isclose(
+        length / step % 1, 0, abs_tol=1e-6
+    )
+    for i, value in enumerate(found):
+        assert math.isclose(value, start + i * step, rel_tol=1e-9, abs_tol=1e-9)
+    assert found[-1] <= start + length + 1e-6 * max(1.0, abs(start + length))
+
+
+@given(st.lists(st.floats(0.1, 40), min_size=1, max_size=8))
+def test_a_list_is_taken_in_its_order(speeds):
+    assert values(speeds) == list(dict.fromkeys(speeds))
+
+
+@given(text=st.text(max_size=200))
+def test_no_text_ends_in_anything_but_a_campaign_or_an_input_error(tmp_path_factory, text):
+    path = tmp_path_factory.mktemp("any") / "any.yaml"
+    path.write_text(text, encoding="utf-8", errors="surrogateescape")
+    try:
+        parse_campaign(read_source(path))
+    except InputError as error:
+        assert str(error).startswith(str(path))
