@@ -19,8 +19,8 @@ that belongs to the unit disc alone. For two points c - s/2 and c + s/2, as comp
     w_n(s) = 2 pi s / (m_n N_n^2) * integral of Re[(c - s/2)^n conj(c + s/2)^n] dc,
 
 over the lens of all c for which both lie in the disc; N_0 = pi, N_n = pi / (2 n + 2) is the integral of
-phi^2, m_0 = 1, m_n = 2 the number of shapes. w_0 is the density of the distance between two random points of a
-disc, and H_0 is that of the rotor-effective wind speed (D. Schlipf, dissertation, Univ. Stuttgart 2016, 5.2).
+phi^2, m_0 = 1, m_n = 2 the number of shapes. w_0 is the density of the distance between two random points
+of a disc, and H_0 that of the rotor-effective wind speed (D. Schlipf, dissertation, Stuttgart 2016, 5.2).
 """
 
 from __future__ import annotations

@@ -79,11 +79,7 @@ class WindSource(ABC):
         Raises InputError where the source is shorter than `duration`: it never repeats itself silently.
         """
         duration = number("duration", duration, above=0.0, unit=" s")
-        if duration > self.length * (1 + ROUNDING):
-            raise InputError(
-                f"wind {self.name} is {self.length:g} s long but the run needs {duration:g} s; "
-                f"make the wind at least {duration:g} s long or the run shorter"
-            )
+        self._refuse_beyond(duration)
         if self.cell_key is None:
             return max(duration, 1.0), self._cells(1)
         return self.cell_key, self._cells(cell_count(duration, self.cell_key))
@@ -95,7 +91,18 @@ class WindSource(ABC):
             return np.empty((0, len(WIND_NAMES)))
         if not (time.min() >= 0.0 and np.isfinite(time.max())):
             raise InputError(f"wind {self.name} has no value before 0 s or at a time that is not finite")
-        return evaluate(*self.cells(max(float(time.max()), 1e-3)), time)
+        self._refuse_beyond(time.max())
+        # The cell that begins at the last time counts too: a step may fall on it.
+        cell_duration = self.cell_key or max(float(time.max()), 1.0)
+        n_cells = int(time.max() / cell_duration + ROUNDING) + 1 if self.cell_key else 1
+        return evaluate(cell_duration, self._cells(n_cells), time)
+
+    def _refuse_beyond(self, duration: float) -> None:
+        if duration > self.length * (1 + ROUNDING):
+            raise InputError(
+                f"wind {self.name} is {self.length:g} s long but the run needs {duration:g} s; "
+                f"make the wind at least {duration:g} s long or the run shorter"
+            )
 
     @cached_property
     def lowest_speed(self) -> tuple[float, float]:
