@@ -1,0 +1,7 @@
+"""How time passes: Butcher tableaux, compiled stepping of lanes, dense output, stability limits."""
+
+from fatigue_runner.integrators.block import simulate_block, warm_up
+from fatigue_runner.integrators.methods import METHODS, method
+from fatigue_runner.integrators.stability import stability_limit
+
+__all__ = ["METHODS", "method", "simulate_block", "stability_limit", "warm_up"]
