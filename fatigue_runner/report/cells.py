@@ -52,12 +52,22 @@ def format_percent(value: float) -> str:
     if percent == 0:
         return "0 %"
     if abs(percent) < 1e-3:
-        return f"{percent:.1e} %"
+        return f"{_power_of_ten(percent)} %"
     digits = max(0, 1 - math.floor(math.log10(abs(percent))))
-    shown = f"{percent:.{digits}f}"
+    shown = f"{percent:.{digits}f}".replace("-", "−")
     return (shown.rstrip("0").rstrip(".") if "." in shown else shown) + " %"
+
+
+def _power_of_ten(value: float) -> str:
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}e{int(exponent)}".replace("-", "−")
 
 
 def format_count(value: float) -> str:
     """A cost or a ratio in plain digits, two significant ones below 10: 12345.6 -> '12346'."""
     return f"{value:.0f}" if abs(value) >= 9.95 else f"{value:.2g}"
+
+
+def format_error(value: float | None) -> str:
+    """A normalised error in powers of ten: 0.00123 -> '1.2e−3'; a dash where it is unknown."""
+    return "–" if value is None else _power_of_ten(value)

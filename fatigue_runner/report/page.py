@@ -1,8 +1,46 @@
-"""The report page (placeholder until the sections land)."""
+"""The page: all sections through one template, self-contained (figures and style inside, nothing fetched)."""
 
+from __future__ import annotations
+
+import base64
+import os
 from pathlib import Path
+
+from fatigue_runner.errors import InputError
+from fatigue_runner.report.rundata import Run, load_run
 
 
 def write_report(run_dir: Path) -> Path:
-    """Write `report.html` into `run_dir` and return its path."""
-    raise NotImplementedError
+    """Write `report.html` into `run_dir` and return its path; only a whole new one replaces an older."""
+    html = render(load_run(run_dir))
+    target = run_dir / "report.html"
+    draft = run_dir / ".report.html.part"
+    try:
+        draft.write_text(html, encoding="utf-8")
+        os.replace(draft, target)
+    except OSError as error:
+        raise InputError(f"{target} cannot be written: {error.strerror}; make the folder writable") from None
+    return target
+
+
+def render(run: Run) -> str:
+    """The report of a run as one HTML document."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    from fatigue_runner.report.sections import builders
+
+    environment = Environment(
+        loader=PackageLoader("fatigue_runner.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["data_uri"] = _data_uri
+    sections = [section for build in builders() if (section := build(run)) is not None]
+    return environment.get_template("page.html").render(run=run, sections=sections)
+
+
+def _data_uri(svg: str) -> str:
+    """An SVG document as an image address: its identifiers cannot meet those of another figure."""
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode()).decode()

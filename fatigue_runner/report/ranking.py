@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
@@ -47,7 +47,8 @@ class DelError:
     def where(self) -> str:
         """The place in words: channel, Wöhler exponent, wind."""
         channel = BY_NAME.get(self.channel)
-        text = f"{channel.label if channel else self.channel}, m = {self.exponent:g}"
+        label = channel.label.removesuffix(" moment") if channel else self.channel
+        text = f"{label}, m = {self.exponent:g}"
         return text if self.wind_speed is None else f"{text}, {self.wind_speed:.3g} m/s"
 
 
@@ -76,6 +77,11 @@ class MethodSummary:
     worst_del_error: DelError | None
     median_del_error: float | None
     on_front: bool = False
+
+    @property
+    def key(self) -> tuple[str, float | None, str, str, bool]:
+        """What the rows of this integrator have in common; see `integrator_key`."""
+        return self.method, self.step, self.corrector, self.mode, self.is_reference
 
     @property
     def label(self) -> str:
@@ -166,10 +172,18 @@ def _del_errors(rows: list[Row], columns: list[tuple[str, float, str]]) -> list[
 
 
 def _mark_front(summaries: list[MethodSummary]) -> list[MethodSummary]:
-    points = [
-        (_or_infinity(s.evaluations_per_second), _error_size(s)) if _competes(s) else None for s in summaries
-    ]
-    return [replace(s, on_front=_undominated(p, points)) for s, p in zip(summaries, points, strict=True)]
+    points = {s: (_or_infinity(s.evaluations_per_second), _error_size(s)) for s in summaries if _competes(s)}
+    front = pareto(points)
+    return [replace(s, on_front=s in front) for s in summaries]
+
+
+def pareto(points: Mapping[MethodSummary, tuple[float, float]]) -> set[MethodSummary]:
+    """The integrators whose (cost, error) no other point equals or beats in both and differs from."""
+
+    def beaten(point: tuple[float, float]) -> bool:
+        return any(p != point and p[0] <= point[0] and p[1] <= point[1] for p in points.values())
+
+    return {summary for summary, point in points.items() if not beaten(point)}
 
 
 def _competes(summary: MethodSummary) -> bool:
@@ -179,13 +193,6 @@ def _competes(summary: MethodSummary) -> bool:
 
 def _error_size(summary: MethodSummary) -> float:
     return math.inf if summary.worst_del_error is None else summary.worst_del_error.size
-
-
-def _undominated(point: tuple | None, points: list[tuple | None]) -> bool:
-    if point is None:
-        return False
-    others = (p for p in points if p is not None and p != point)
-    return not any(p[0] <= point[0] and p[1] <= point[1] for p in others)
 
 
 def cheapest_within(summaries: Iterable[MethodSummary], level: float) -> MethodSummary | None:

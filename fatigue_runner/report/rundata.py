@@ -1,0 +1,190 @@
+"""A run folder as the report sees it: the results table, the resolved campaign, and the logs, each read once.
+
+Settings and facts come from `run.json`; a folder without one (results from elsewhere) falls back to
+`campaign.yaml` and to the metadata of a log.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fatigue_runner.errors import FatigueRunnerError, InputError
+from fatigue_runner.report.cells import Row, number, text
+from fatigue_runner.report.ranking import MethodSummary, fatigue_columns, integrator_key, rank, reference_of
+
+if TYPE_CHECKING:
+    from fatigue_runner.logbook import Log
+
+NEEDED_COLUMNS = ("case_id", "method", "step", "is_reference", "status")
+WIND_COLUMNS = (
+    "wind_source",
+    "wind_speed",
+    "vertical_shear",
+    "horizontal_shear",
+    "turbulence_intensity",
+    "seed",
+)
+
+
+@dataclass(frozen=True)
+class WindCase:
+    """One wind and every integrator's row for it."""
+
+    speed: float | None
+    key: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    def row_of(self, summary: MethodSummary) -> Row | None:
+        """The row of an integrator under this wind; None where it did not run."""
+        return next((row for row in self.rows if integrator_key(row) == summary.key), None)
+
+
+class Run:
+    """Everything the sections draw on; raises InputError where the folder holds no results."""
+
+    def __init__(
+        self,
+        folder: Path,
+        rows: Sequence[Row],
+        campaign: Mapping[str, Any],
+        facts: Mapping[str, str] | None = None,
+    ) -> None:
+        self.folder = folder
+        self._facts = facts or {}
+        self.rows = list(rows)
+        self.campaign = campaign
+        self.summaries = rank(self.rows)
+        self.columns = fatigue_columns(self.rows)
+        self._logs: dict[str, Log | None] = {}
+
+    @property
+    def name(self) -> str:
+        """The campaign's name; the folder's where the campaign has none."""
+        return str(self.campaign.get("name") or self.folder.resolve().name)
+
+    @cached_property
+    def reference(self) -> MethodSummary | None:
+        """The reference's summary; None where the campaign ran without one."""
+        return reference_of(self.summaries)
+
+    @cached_property
+    def integrators(self) -> list[MethodSummary]:
+        """The summaries of all integrators but the reference, cheapest first."""
+        return [summary for summary in self.summaries if not summary.is_reference]
+
+    @cached_property
+    def winds(self) -> list[WindCase]:
+        """Every wind of the campaign with its rows, slowest first."""
+        groups: dict[tuple[str, ...], list[Row]] = {}
+        for row in self.rows:
+            groups.setdefault(tuple(text(row, column) for column in WIND_COLUMNS), []).append(row)
+        winds = [WindCase(number(rows[0], "wind_speed"), key, tuple(rows)) for key, rows in groups.items()]
+        return sorted(winds, key=lambda wind: (wind.speed is None, wind.speed or 0.0, wind.key))
+
+    def setting(self, path: str, default: Any = None) -> Any:
+        """A value of the resolved campaign by its dotted path; `default` where it is absent or null."""
+        value: Any = self.campaign
+        for key in path.split("."):
+            value = value.get(key) if isinstance(value, Mapping) else None
+        return default if value is None else value
+
+    def log(self, case_id: str) -> Log | None:
+        """The log of a case; None where it is missing or cannot be read."""
+        if case_id not in self._logs:
+            self._logs[case_id] = _read_log(self.folder / "logs" / f"{case_id}.mcap")
+        return self._logs[case_id]
+
+    @cached_property
+    def facts(self) -> list[tuple[str, str]]:
+        """What was run, with what, when and where: (name, value) of the page's head."""
+        facts = self._facts or self._facts_of_a_log()
+        finished = datetime.fromtimestamp((self.folder / "results.csv").stat().st_mtime, tz=UTC)
+        shown = {
+            "Campaign": self.name,
+            "Turbine": str(facts.get("turbine") or self.setting("turbine", "")),
+            "Turbine hash": str(facts.get("turbine_hash", ""))[:16],
+            "Cases": f"{len(self.winds)} winds × {len(self.summaries)} integrators = {len(self.rows)}",
+            "Finished": finished.strftime("%Y-%m-%d %H:%M UTC"),
+            "Machine": str(facts.get("machine", "")),
+            "Versions": str(facts.get("versions", "")),
+        }
+        return [(name, value) for name, value in shown.items() if value]
+
+    def _facts_of_a_log(self) -> dict[str, str]:
+        logs = (self.log(text(row, "case_id")) for row in self.rows[:20])
+        return next((dict(log.run) for log in logs if log is not None), {})
+
+
+def load_run(folder: Path) -> Run:
+    """Read `results.csv` and the settings of a run folder.
+
+    Raises InputError, one sentence, for a folder without results, an empty or foreign table, or unreadable
+    settings.
+    """
+    table = folder / "results.csv"
+    if not table.is_file():
+        raise InputError(f"{folder} holds no results.csv; give the output folder of `fatigue-runner run`")
+    try:
+        with table.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(
+            f"{table} cannot be read as CSV: {error}; run the campaign again to rewrite it"
+        ) from None
+    if not rows:
+        raise InputError(f"{table} has no cases; run the campaign again to fill it")
+    missing = [column for column in NEEDED_COLUMNS if column not in rows[0]]
+    if missing:
+        raise InputError(f"{table} lacks the column {missing[0]!r}; is it the results table of a campaign?")
+    return Run(folder, rows, *_read_settings(folder))
+
+
+def _read_settings(folder: Path) -> tuple[Mapping[str, Any], Mapping[str, str]]:
+    """The resolved campaign and the facts (turbine, hash, versions, machine); empty where unknown."""
+    try:
+        stored = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        campaign, facts = stored["campaign"], stored.get("facts", {})
+        if isinstance(campaign, Mapping) and isinstance(facts, Mapping):
+            return campaign, facts
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(
+            f"{folder / 'run.json'} cannot be read; run the campaign again into a new folder"
+        ) from None
+    return _read_campaign(folder / "campaign.yaml"), {}
+
+
+def _read_campaign(path: Path) -> Mapping[str, Any]:
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    if not path.is_file():
+        return {}
+    try:
+        campaign = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        raise InputError(
+            f"{path} cannot be read: {str(error).splitlines()[0]}; run the campaign again"
+        ) from None
+    if campaign is not None and not isinstance(campaign, Mapping):
+        raise InputError(f"{path} is not a campaign: it must be a mapping of keys to values")
+    return campaign or {}
+
+
+def _read_log(path: Path) -> Log | None:
+    if not path.is_file():
+        return None
+    from fatigue_runner.logbook import read_log
+
+    try:
+        return read_log(path)
+    except (FatigueRunnerError, OSError):
+        return None

@@ -1,0 +1,94 @@
+"""The answer first: which integrator is good enough, and what it costs."""
+
+from __future__ import annotations
+
+from fatigue_runner.report.blocks import Column, Paragraph, Section, Table, TableRow
+from fatigue_runner.report.cells import format_count, format_error, format_percent
+from fatigue_runner.report.ranking import LEVELS, MethodSummary, answer, cheapest_within
+from fatigue_runner.report.rundata import Run
+
+ORDER = 10
+
+COLUMNS = (
+    Column("Integrator", number=False),
+    Column("Cost", "evaluations per simulated s"),
+    Column("Fewer than reference", "times"),
+    Column("Measured", "µs per simulated s"),
+    Column("State error", "NRMSE, median"),
+    Column("State error", "NRMSE, worst"),
+    Column("DEL error", "median"),
+    Column("DEL error", "worst"),
+    Column("Worst DEL error at", number=False),
+    Column("Verdict", number=False),
+)
+
+
+def build(run: Run) -> Section:
+    """One sentence per level of DEL error, then every integrator with its cost, its errors and a verdict."""
+    sentences = answer(run.summaries)
+    winners = [cheapest_within(run.integrators, level) for level in LEVELS]
+    rows = [TableRow(_cells(run, s), _mark(s, winners)) for s in run.summaries]
+    lead = [Paragraph(sentence, strong=i == 0) for i, sentence in enumerate(sentences)]
+    return Section(
+        "Which integrator is good enough, and what does it cost?", [*lead, Table(COLUMNS, rows, CAPTION)]
+    )
+
+
+CAPTION = (
+    "Cheapest first. Cost: evaluations of the equations of motion, and the measured wall-clock time of the "
+    "integration alone, "
+    "medians over the finished cases. Errors against the reference of the same wind; DEL errors over all "
+    "channels, Wöhler exponents "
+    "and winds. ● on the Pareto front: nothing else is both cheaper and better. Shaded: the cheapest at each "
+    "level."
+)
+
+
+def _cells(run: Run, s: MethodSummary) -> list[str]:
+    saving = None
+    if (
+        run.reference
+        and run.reference.evaluations_per_second
+        and s.evaluations_per_second
+        and not s.is_reference
+    ):
+        saving = run.reference.evaluations_per_second / s.evaluations_per_second
+    worst = s.worst_del_error
+    return [
+        s.label + (" (reference)" if s.is_reference else " ●" if s.on_front else ""),
+        _shown(s.evaluations_per_second),
+        _shown(saving),
+        _shown(None if s.wall_time_per_second is None else s.wall_time_per_second * 1e6),
+        format_error(s.nrmse_median),
+        format_error(s.nrmse_worst),
+        "–" if s.median_del_error is None else format_percent(s.median_del_error),
+        "–" if worst is None else format_percent(worst.value),
+        "–" if worst is None else worst.where(),
+        _verdict(s),
+    ]
+
+
+def _shown(value: float | None) -> str:
+    return "–" if value is None else format_count(value)
+
+
+def _verdict(s: MethodSummary) -> str:
+    lost = [
+        f"{what} in {n} of {s.cases}" for n, what in ((s.diverged, "diverged"), (s.failed, "failed")) if n
+    ]
+    if lost:
+        return ", ".join(lost)
+    if s.is_reference:
+        return "reference"
+    if s.worst_del_error is None:
+        return "not compared"
+    within = [level for level in LEVELS if s.worst_del_error.size <= level]
+    return f"within {format_percent(min(within))}" if within else f"not within {format_percent(max(LEVELS))}"
+
+
+def _mark(s: MethodSummary, winners: list[MethodSummary | None]) -> str:
+    if s in winners:
+        return "good"
+    if s.is_reference:
+        return "quiet"
+    return "" if s.complete else "bad"

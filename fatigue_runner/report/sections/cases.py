@@ -1,0 +1,107 @@
+"""Every case: those that did not finish, with their times, and the table of all."""
+
+from __future__ import annotations
+
+from fatigue_runner.report.blocks import Block, Column, Paragraph, Section, Table, TableRow
+from fatigue_runner.report.cells import Row, format_error, format_percent, format_step, number, text, truth
+from fatigue_runner.report.rundata import Run
+from fatigue_runner.report.sections.limits import lost_probability
+
+ORDER = 70
+MOST = 200  # rows on paper; the rest is in results.csv
+
+
+def build(run: Run) -> Section:
+    """The cases that did not finish, then all of them (the worst where there are too many for paper)."""
+    blocks: list[Block] = [*_unfinished(run), *_all(run)]
+    return Section("Cases", blocks)
+
+
+def _unfinished(run: Run) -> list[Block]:
+    bad = [row for row in run.rows if text(row, "status") != "done"]
+    if not bad:
+        return [Paragraph(f"All {len(run.rows)} cases finished; no probability is lost.")]
+    columns = [
+        *CASE_COLUMNS[:4],
+        Column("Status", number=False),
+        Column("at", "s"),
+        Column("Reason", number=False),
+    ]
+    rows = [
+        TableRow([*_who(row), text(row, "status"), _at(row), text(row, "error_message") or "–"], "bad")
+        for row in bad
+    ]
+    caption = (
+        f"Cases that did not finish: {len(bad)} of {len(run.rows)}, lost probability over all integrators "
+        f"{format_percent(lost_probability(run.rows))}. They are logged up to the time given and left out of "
+        "every load."
+    )
+    return [Table(columns, rows, caption)]
+
+
+CASE_COLUMNS = (
+    Column("Wind", "m/s"),
+    Column("Shear", "vertical / horizontal"),
+    Column("Seed"),
+    Column("Integrator", number=False),
+    Column("Status", number=False),
+    Column("Evaluations"),
+    Column("Time", "ms"),
+    Column("NRMSE", "worst state"),
+    Column("DEL error", "worst"),
+    Column("Clamped", "look-ups"),
+)
+
+
+def _all(run: Run) -> list[Block]:
+    rows = [row for wind in run.winds for row in wind.rows]
+    caption = "All cases, by wind speed. Every column of every channel is in results.csv."
+    if len(rows) > MOST:
+        rows = sorted(rows, key=lambda row: -(_worst(run, row) or 0.0))[:MOST]
+        caption = (
+            f"The {MOST} of {len(run.rows)} cases with the largest DEL error. All of them are in results.csv."
+        )
+    return [Table(CASE_COLUMNS, [_case(run, row) for row in rows], caption)]
+
+
+def _case(run: Run, row: Row) -> TableRow:
+    wall, worst = number(row, "wall_time"), _worst(run, row)
+    cells = [
+        *_who(row),
+        text(row, "status"),
+        _whole(row, "evaluations"),
+        "–" if wall is None else f"{wall * 1e3:.2f}",
+        "–" if truth(row, "is_reference") else format_error(number(row, "nrmse_max")),
+        "–" if worst is None or truth(row, "is_reference") else format_percent(worst),
+        _whole(row, "clamped_lookups"),
+    ]
+    mark = "bad" if text(row, "status") != "done" else "quiet" if truth(row, "is_reference") else ""
+    return TableRow(cells, mark)
+
+
+def _who(row: Row) -> list[str]:
+    speed, step = number(row, "wind_speed"), number(row, "step")
+    shear = " / ".join(
+        "–" if value is None else f"{value:.3g}"
+        for value in (number(row, "vertical_shear"), number(row, "horizontal_shear"))
+    )
+    integrator = text(row, "method") + ("" if step is None else f" {format_step(step)}")
+    if text(row, "corrector"):
+        integrator += f" + {text(row, 'corrector')}"
+    return ["–" if speed is None else f"{speed:.4g}", shear, text(row, "seed") or "–", integrator]
+
+
+def _at(row: Row) -> str:
+    at = number(row, "diverged_at")
+    return "–" if at is None else f"{at:.4g}"
+
+
+def _whole(row: Row, column: str) -> str:
+    value = number(row, column)
+    return "–" if value is None else f"{value:.0f}"
+
+
+def _worst(run: Run, row: Row) -> float | None:
+    """The largest size of the row's DEL errors."""
+    sizes = [abs(v) for _, _, suffix in run.columns if (v := number(row, f"del_error_{suffix}")) is not None]
+    return max(sizes, default=None)

@@ -1,0 +1,117 @@
+"""What every figure of the report rests on, spelled out."""
+
+from __future__ import annotations
+
+from fatigue_runner.channels import BY_NAME
+from fatigue_runner.report.blocks import Definitions, Section
+from fatigue_runner.report.rundata import Run
+
+ORDER = 90
+
+RESIDUES = {
+    "half": "counted as half cycles",
+    "full": "counted as full cycles",
+    "drop": "left out",
+}
+
+
+def build(run: Run) -> Section:
+    """The definitions with this run's settings in them."""
+    items = [
+        ("Damage-equivalent load (DEL)", _del(run)),
+        ("Counting", _counting(run)),
+        (
+            "Wöhler exponents",
+            f"m = {', '.join(f'{m:g}' for m in sorted({m for _, m, _ in run.columns}))}; every exponent on "
+            "the same ranges.",
+        ),
+        ("Channels", _channels(run)),
+        (
+            "DEL error",
+            "(DEL − DEL_ref) / DEL_ref of the same wind. An error e of the load is about m·e of the damage.",
+        ),
+        (
+            "Damage ratio",
+            "(DEL / DEL_ref)ᵐ of the same wind: the damage with this integrator over that of the reference.",
+        ),
+        ("Reference", _reference(run)),
+        (
+            "NRMSE",
+            "Root mean square of (state − reference) over the output samples, over the range (max − min) of "
+            "the reference state; the headline is the worst of the 16 states.",
+        ),
+        (
+            "Cost",
+            "Evaluations of the equations of motion per simulated second, and the wall-clock time of the "
+            "compiled integration alone: no start-up, no log, no counting.",
+        ),
+        (
+            "Divergence",
+            "A case whose state leaves all physical bounds ends there; it is logged up to that time and "
+            "takes no part in any load.",
+        ),
+        ("Sampling", _sampling(run)),
+    ]
+    return Section("Definitions", [Definitions([(term, meaning) for term, meaning in items if meaning])])
+
+
+def _counted(run: Run) -> float | None:
+    duration = run.setting("duration")
+    return None if duration is None else float(duration) - float(run.setting("discard", 0.0))
+
+
+def _del(run: Run) -> str:
+    counted = _counted(run)
+    cycles = "" if counted is None else f" = {counted:g} cycles"
+    return (
+        "DEL = (Σ nᵢ Sᵢᵐ / N_eq)^(1/m): the constant load range S that in N_eq cycles does the damage of all "
+        "counted ranges Sᵢ "
+        f"(peak to peak), nᵢ times each. Short-term: N_eq = 1 Hz × counted duration{cycles}."
+    )
+
+
+def _counting(run: Run) -> str:
+    residue = str(run.setting("fatigue.residue", "half"))
+    return (
+        "Rainflow, three-point, as ASTM E1049; ranges unbinned, no mean-stress correction; "
+        f"the residue is {RESIDUES.get(residue, residue)}."
+    )
+
+
+def _channels(run: Run) -> str:
+    channels = dict.fromkeys(channel for channel, _, _ in run.columns)
+    named = [BY_NAME[c].label if c in BY_NAME else c for c in channels]
+    axes = " Axes and signs as OpenFAST's RootMyb/RootMxb (blade root) and TwrBsMyt/TwrBsMxt (tower base)."
+    return f"{', '.join(named)}.{axes}" if named else ""
+
+
+def _reference(run: Run) -> str:
+    if run.reference is None:
+        return "None was run."
+    return (
+        f"{run.reference.label}: the same wind, initial state, turbine and compiled kernel; only the "
+        "integrator differs. "
+        "What the reference itself gets wrong is in no figure here."
+    )
+
+
+def _sampling(run: Run) -> str:
+    parts = []
+    if run.setting("output_rate") is not None:
+        parts.append(
+            f"States and loads are taken at {float(run.setting('output_rate')):g} Hz, whatever the step."
+        )
+    if run.setting("duration") is not None:
+        discard = float(run.setting("discard", 0.0))
+        parts.append(
+            f"Each case lasts {float(run.setting('duration')):g} s; "
+            + (
+                f"the first {discard:g} s are discarded."
+                if discard
+                else "nothing is discarded from its start."
+            )
+        )
+    if run.setting("initial") is not None:
+        initial = run.setting("initial")
+        parts.append(f"Initial state: {initial if isinstance(initial, str) else 'as given in the campaign'}.")
+    return " ".join(parts)

@@ -1,0 +1,128 @@
+"""DEL error over cost, in evaluations of the equations of motion and in time, with the Pareto front."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from fatigue_runner.report.blocks import Figure, Paragraph, Section
+from fatigue_runner.report.cells import format_step
+from fatigue_runner.report.ranking import LEVELS, MethodSummary, pareto
+from fatigue_runner.report.rundata import Run
+from fatigue_runner.report.style import (
+    FAINT,
+    QUIET,
+    Look,
+    family,
+    halo,
+    looks,
+    new_figure,
+    percent,
+    plain_logarithm,
+    styled,
+    to_svg,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+ORDER = 50
+Cost = Callable[[MethodSummary], float | None]
+
+
+def build(run: Run) -> Section:
+    """Worst DEL error over cost on logarithmic axes; a sentence where nothing was compared."""
+    title = "DEL error over cost"
+    drawn = [
+        s
+        for s in run.integrators
+        if s.complete and s.worst_del_error is not None and s.worst_del_error.size > 0
+    ]
+    if not drawn:
+        return Section(
+            title, [Paragraph("Not drawn: no integrator finished all its cases beside a reference.")]
+        )
+    lost = [s.label for s in run.integrators if not s.complete]
+    caption = (
+        "Each point is one integrator: its worst DEL error over all channels, Wöhler exponents and winds, "
+        "over its cost per simulated "
+        "second, counted (left) and measured (right); the thin stem ends at its median DEL error. Filled, on "
+        "the grey line: the Pareto "
+        "front of each panel. "
+        + (f"Not drawn, since cases diverged or failed: {', '.join(lost)}." if lost else "")
+    )
+    return Section(title, [Figure(_draw(run, drawn), caption.strip(), "Worst DEL error over cost, log-log")])
+
+
+def _draw(run: Run, drawn: list[MethodSummary]) -> str:
+    with styled():
+        figure = new_figure(3.9)
+        left, right = figure.subplots(1, 2, sharey=True)
+        look = looks(run.summaries)
+        _draw_panel(left, drawn, look, lambda s: s.evaluations_per_second)
+        _draw_panel(right, drawn, look, lambda s: s.wall_time_per_second and s.wall_time_per_second * 1e6)
+        left.set_xlabel("evaluations per simulated second")
+        right.set_xlabel("measured time per simulated second [µs]")
+        left.set_ylabel("worst DEL error")
+        left.yaxis.set_major_formatter(percent)
+        return to_svg(figure)
+
+
+def _draw_panel(axes: Axes, drawn: list[MethodSummary], look: dict[MethodSummary, Look], cost: Cost) -> None:
+    points = {s: (x, s.worst_del_error.size) for s in drawn if (x := cost(s)) and s.worst_del_error}
+    front = pareto(points)
+    axes.loglog(*zip(*points.values(), strict=True), linestyle="none")  # sets the limits
+    axes.margins(x=0.1, y=0.1)
+    _make_room_for_labels(axes)
+    axes.grid(which="major")
+    plain_logarithm(axes.xaxis)
+    for level in LEVELS:
+        axes.axhline(level, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3)), zorder=0.5)
+    _draw_front(axes, sorted(points[s] for s in front))
+    families: dict[tuple[str, str, str], list[MethodSummary]] = {}
+    for summary in sorted(points, key=lambda s: points[s][0]):
+        families.setdefault(family(summary), []).append(summary)
+    for members in families.values():
+        axes.plot(
+            *zip(*(points[s] for s in members), strict=True), color=look[members[0]].colour, linewidth=1.0
+        )
+        for summary in members:
+            _draw_point(axes, summary, points[summary], look[summary], summary in front)
+            _label(axes, summary, points[summary], look[summary], named=summary is members[-1])
+
+
+def _make_room_for_labels(axes: Axes) -> None:
+    low, high = axes.get_xlim()
+    axes.set_xlim(low, high * (high / low) ** 0.12)
+
+
+def _draw_front(axes: Axes, front: list[tuple[float, float]]) -> None:
+    if front:
+        axes.plot(
+            *zip(*front, strict=True), color=FAINT, linewidth=4, alpha=0.7, zorder=0.8, drawstyle="steps-post"
+        )
+
+
+def _draw_point(axes: Axes, s: MethodSummary, point: tuple[float, float], look: Look, on_front: bool) -> None:
+    x, y = point
+    if s.median_del_error:
+        axes.plot([x, x], [s.median_del_error, y], color=look.colour, linewidth=0.6, alpha=0.6)
+    axes.plot(x, y, markersize=5, **look.dots(filled=on_front))
+
+
+def _label(axes: Axes, s: MethodSummary, point: tuple[float, float], look: Look, named: bool) -> None:
+    """The step beside its point; the last point of a line carries the method's name too."""
+    step = "" if s.step is None else format_step(s.step)
+    name = s.method + (f" + {s.corrector}" if s.corrector else "")
+    text = f"{name} {step}" if named else step
+    weight = "bold" if named else "normal"
+    axes.annotate(
+        text,
+        point,
+        xytext=(5, 3),
+        textcoords="offset points",
+        fontsize=6.5,
+        fontweight=weight,
+        color=look.colour,
+        path_effects=[halo()],
+    )

@@ -1,0 +1,89 @@
+"""What limits the result: lost cases, clamped table look-ups, missing references. Before the figures."""
+
+from __future__ import annotations
+
+from fatigue_runner.report.blocks import Section, Warnings
+from fatigue_runner.report.cells import Row, format_percent, number, text
+from fatigue_runner.report.rundata import Run
+
+ORDER = 20
+SHORT = 600.0  # s; the length of a load case in IEC 61400-1
+
+
+def build(run: Run) -> Section | None:
+    """The warnings of this run; None where there are none."""
+    items = [*_clamped(run), *_lost(run), *_uncompared(run), *_short(run), *_folder(run)]
+    return Section("What limits this result", [Warnings(items)]) if items else None
+
+
+def lost_probability(rows: list[Row]) -> float:
+    """Share of the probability in cases that did not finish; without weights every case weighs the same."""
+    weights = [number(row, "probability") or 0.0 for row in rows]
+    if not any(weights):
+        weights = [1.0] * len(rows)
+    lost = sum(w for w, row in zip(weights, rows, strict=True) if text(row, "status") != "done")
+    return lost / sum(weights) if rows else 0.0
+
+
+def rows_of(run: Run, key: tuple) -> list[Row]:
+    """All rows of one integrator."""
+    from fatigue_runner.report.ranking import integrator_key
+
+    return [row for row in run.rows if integrator_key(row) == key]
+
+
+def _clamped(run: Run) -> list[str]:
+    clamped = [(row, count) for row in run.rows if (count := number(row, "clamped_lookups"))]
+    if not clamped:
+        return []
+    speeds = sorted({speed for row, _ in clamped if (speed := number(row, "wind_speed")) is not None})
+    at = f", at hub winds from {speeds[0]:.3g} to {speeds[-1]:.3g} m/s" if speeds else ""
+    total = sum(count for _, count in clamped)
+    return [
+        f"{len(clamped)} of {len(run.rows)} cases left the range of the aerodynamic tables ({total:.0f} "
+        f"look-ups in all{at}). "
+        "Outside it the nearest tabulated value is taken: the loads there are not those of the turbine."
+    ]
+
+
+def _lost(run: Run) -> list[str]:
+    items = []
+    for s in run.summaries:
+        if s.cases and not s.complete:
+            share = format_percent(lost_probability(rows_of(run, s.key)))
+            items.append(
+                f"{s.label}: {s.cases - s.done} of {s.cases} cases did not finish; {share} of the "
+                "probability is lost "
+                "and no damage is counted for it. The cases are listed below."
+            )
+    return items
+
+
+def _uncompared(run: Run) -> list[str]:
+    if run.reference is None:
+        return [
+            "The campaign has no reference: the errors are unknown and no integrator can be called good "
+            "enough."
+        ]
+    if not run.reference.complete:
+        return ["The reference did not finish every wind; where it is missing, no integrator was compared."]
+    return []
+
+
+def _short(run: Run) -> list[str]:
+    counted = float(run.setting("duration", SHORT)) - float(run.setting("discard", 0.0))
+    if counted >= SHORT:
+        return []
+    return [
+        f"Each case counts {counted:g} s; IEC 61400-1 asks for {SHORT:g} s. That is enough to compare "
+        "integrators under the same "
+        "wind, and too little for a design load."
+    ]
+
+
+def _folder(run: Run) -> list[str]:
+    return (
+        []
+        if run.campaign
+        else ["The run folder has no campaign.yaml; the settings below are the program's defaults."]
+    )
