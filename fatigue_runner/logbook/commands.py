@@ -1,0 +1,209 @@
+"""`fatigue-runner logs`: info, check, recover, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from fatigue_runner import channels
+from fatigue_runner.logbook.check import check as check_log
+from fatigue_runner.logbook.errors import LogError
+from fatigue_runner.logbook.export import export as export_log
+from fatigue_runner.logbook.recovery import recover as recover_log
+from fatigue_runner.logbook.summary import LogSummary, summarise
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    help="Look into the logs of a run: what ran, whether the file is whole, repair it, export it.",
+)
+
+LogPath = Annotated[Path, typer.Argument(help="A log (.mcap).", show_default=False)]
+# Stretches of rejected steps that `info` lists; the longest tell most.
+_SHOWN_STRETCHES = 8
+_EXTREMES_WIDTH = 100
+
+
+@app.command()
+def info(log: LogPath) -> None:
+    """Print what ran, with what, how often the corrector was accepted, where not, and the extremes.
+
+    Examples:
+
+        fatigue-runner logs info runs/quickstart/logs/w03-heun-10ms.mcap
+    """
+    console = Console()
+    summary = summarise(log)
+    _print_head(console, summary)
+    _print_acceptance(console, summary)
+    if summary.extremes:
+        # A cut number would be a wrong one: rather let a narrow terminal wrap the lines.
+        console.width = max(console.width, _EXTREMES_WIDTH)
+        console.print(_extremes_table(summary))
+
+
+def _print_head(console: Console, summary: LogSummary) -> None:
+    rate = f", {summary.rate:g} rows per second" if summary.rate else ""
+    console.print(f"[bold]{escape(str(summary.path))}[/]", soft_wrap=True)
+    console.print(
+        f"{summary.rows} rows, {summary.duration:g} s{rate}, {summary.size / 1e6:.2f} MB, "
+        + ("complete" if summary.complete else "[red]not complete[/]")
+    )
+    if summary.lost:
+        console.print(f"[red]damaged:[/] {escape(summary.lost)}", soft_wrap=True)
+    for title, entries in (("run", summary.run), ("result", summary.result)):
+        table = Table("", "", title=title, show_header=False, title_justify="left", box=None)
+        for key, value in entries.items():
+            if value != "":
+                table.add_row(escape(key), escape(value))
+        if table.row_count:
+            console.print(table)
+    if summary.attachments:
+        names = ", ".join(f"{name} ({size} bytes)" for name, size in summary.attachments.items())
+        console.print(f"attached: {escape(names)}", soft_wrap=True)
+
+
+def _print_acceptance(console: Console, summary: LogSummary) -> None:
+    if summary.acceptance_rate is None:
+        console.print("acceptance: nothing was tested (no hybrid integrator)")
+        return
+    console.print(f"acceptance: {summary.acceptance_rate:.2%} of the intervals, {summary.rejected} rejected")
+    for name, wind in (("accepted", summary.accepted_wind), ("rejected", summary.rejected_wind)):
+        if wind:
+            console.print(
+                f"  wind where {name}: median {wind[1]:.2f} m/s, 90 % in {wind[0]:.2f} to {wind[2]:.2f}"
+            )
+    for s in summary.rejections[:_SHOWN_STRETCHES]:
+        speed = "" if s.wind_speed is None else f" at {s.wind_speed:.2f} m/s"
+        console.print(f"  rejected {s.begin:.3f} to {s.end:.3f} s ({s.intervals} intervals){speed}")
+    more = len(summary.rejections) - _SHOWN_STRETCHES
+    if more > 0:
+        console.print(f"  and {more} shorter stretches")
+
+
+def _extremes_table(summary: LogSummary) -> Table:
+    table = Table(title="extremes", title_justify="left", box=None, padding=(0, 2, 0, 0))
+    table.add_column("channel")
+    table.add_column("unit")
+    for heading in ("min", "at s", "mean", "max", "at s"):
+        table.add_column(heading, justify="right")
+    for e in summary.extremes:
+        known = channels.BY_NAME.get(e.name)
+        unit, scale = (known.read_unit, known.scale) if known else (e.unit, 1.0)
+        values = f"{e.minimum * scale:.5g}", f"{e.mean * scale:.5g}", f"{e.maximum * scale:.5g}"
+        name = e.name + (f" ({e.not_finite} not finite)" if e.not_finite else "")
+        table.add_row(
+            name, unit, values[0], f"{e.time_of_minimum:g}", values[1], values[2], f"{e.time_of_maximum:g}"
+        )
+    return table
+
+
+@app.command()
+def check(
+    logs: Annotated[list[Path], typer.Argument(help="Logs (.mcap), or folders of logs.", show_default=False)],
+) -> None:
+    """Check every checksum, index, count and time; exit code 1 where one is wrong.
+
+    Examples:
+
+        fatigue-runner logs check runs/quickstart/logs
+
+        fatigue-runner logs check case.mcap other.mcap
+    """
+    console = Console()
+    damaged = 0
+    for path in _expand(logs):
+        try:
+            found = check_log(path)
+        except LogError as error:
+            if len(logs) == 1 and path == logs[0]:
+                raise
+            console.print(f"[red]wrong[/] {escape(str(error))}", soft_wrap=True)
+            damaged += 1
+            continue
+        if found.ok:
+            state = "" if found.complete else ", but without the end of its run"
+            what = f"{found.chunks} chunks, {found.messages} messages, {found.rows} rows{state}"
+            console.print(f"[green]good[/]  {escape(str(path))}: {what}", soft_wrap=True)
+            continue
+        damaged += 1
+        console.print(
+            f"[red]wrong[/] {escape(str(path))}: {escape('; '.join(found.problems))}", soft_wrap=True
+        )
+    if damaged:
+        console.print("`fatigue-runner logs recover FILE` keeps what is good of a damaged log")
+        raise typer.Exit(1)
+
+
+def _expand(paths: list[Path]) -> list[Path]:
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted([*path.rglob("*.mcap"), *path.rglob("*.mcap.part")])
+            if not inside:
+                raise LogError(f"there is no log (.mcap) in {path}")
+            found += inside
+        else:
+            found.append(path)
+    return found
+
+
+@app.command()
+def recover(
+    log: LogPath,
+    to: Annotated[
+        Path | None, typer.Option("--to", help="Write a copy there; default: repair in place.")
+    ] = None,
+) -> None:
+    """Repair a log that was cut off or damaged and say what was lost.
+
+    Keeps every whole row before the first damage. A `.mcap.part` file, as an interrupted run leaves it,
+    gets its final name. The file is replaced only when the repaired one is whole.
+
+    Examples:
+
+        fatigue-runner logs recover case.mcap.part
+
+        fatigue-runner logs recover damaged.mcap --to repaired.mcap
+    """
+    console = Console()
+    done = recover_log(log, to)
+    if not done.changed and not done.lost:
+        copied = f", copied to {done.path}" if to else ""
+        console.print(f"{escape(str(log))} is whole, nothing to repair{escape(copied)}", soft_wrap=True)
+        return
+    kept = f"{done.rows} rows up to {done.end_time:g} s"
+    console.print(f"repaired: {escape(str(done.path))}, {kept}", soft_wrap=True)
+    for sentence in done.lost or ["nothing"]:
+        console.print(f"lost: {escape(sentence)}", soft_wrap=True)
+
+
+@app.command()
+def export(
+    log: LogPath,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="File to write: .csv or .parquet.", show_default=False)
+    ],
+    channels: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--channel", "-c", help="Channel name or pattern; repeatable. Default: all.", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Write channels of a log as a table (SI units, one row per time).
+
+    Examples:
+
+        fatigue-runner logs export case.mcap -o case.parquet
+
+        fatigue-runner logs export case.mcap -o flap.csv -c 'blade*_root_flapwise_moment' -c wind_speed
+    """
+    names = export_log(log, channels, out)
+    typer.echo(f"{out}: {', '.join(names)}")

@@ -1,0 +1,147 @@
+"""What a log tells at a glance: what ran, with what, where the corrector was trusted, the extremes."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from fatigue_runner import channels
+from fatigue_runner.logbook.reader import Log, read_log
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Rejected intervals in a row: begin and end [s], how many, mean wind speed there [m/s]."""
+
+    begin: float
+    end: float
+    intervals: int
+    wind_speed: float | None
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """A channel's smallest, mean and largest value (SI) and the times of the two [s]."""
+
+    name: str
+    unit: str
+    minimum: float
+    mean: float
+    maximum: float
+    time_of_minimum: float
+    time_of_maximum: float
+    not_finite: int = 0
+
+
+@dataclass
+class LogSummary:
+    """What `fatigue-runner logs info` prints.
+
+    acceptance_rate: of the intervals of a guarded run, None where nothing was guarded; rejections: the
+    longest stretches first; rejected_wind, accepted_wind: 5 %, 50 % and 95 % quantiles of the wind speed
+    [m/s].
+    """
+
+    path: Path
+    size: int
+    rows: int
+    duration: float
+    rate: float | None
+    run: dict[str, str]
+    result: dict[str, str]
+    attachments: dict[str, int]
+    complete: bool
+    lost: str
+    acceptance_rate: float | None = None
+    rejected: int = 0
+    rejections: list[Stretch] = field(default_factory=list)
+    rejected_wind: tuple[float, float, float] | None = None
+    accepted_wind: tuple[float, float, float] | None = None
+    extremes: list[Extreme] = field(default_factory=list)
+
+
+def _extreme(name: str, unit: str, values: np.ndarray, time: np.ndarray) -> Extreme | None:
+    good = np.isfinite(values)
+    if not good.any():
+        return None
+    lowest = int(np.argmin(np.where(good, values, np.inf)))
+    highest = int(np.argmax(np.where(good, values, -np.inf)))
+    return Extreme(
+        name=name,
+        unit=unit,
+        minimum=float(values[lowest]),
+        mean=float(values[good].mean()),
+        maximum=float(values[highest]),
+        time_of_minimum=float(time[lowest]),
+        time_of_maximum=float(time[highest]),
+        not_finite=int((~good).sum()),
+    )
+
+
+def extremes(log: Log) -> list[Extreme]:
+    """Extremes of every channel in the log, loads first; without the azimuths, which only grow."""
+    columns = dict(log.loads)
+    columns |= dict(zip(channels.STATE_NAMES, log.state.T, strict=False)) if len(log.state) else {}
+    columns |= dict(zip(channels.WIND_NAMES, log.wind.T, strict=False)) if len(log.wind) else {}
+    found = []
+    for name, values in columns.items():
+        unit = channels.BY_NAME[name].unit if name in channels.BY_NAME else log.units.get(name, "")
+        extreme = None if unit == "rad" else _extreme(name, unit, values, log.time)
+        if extreme is not None:
+            found.append(extreme)
+    return found
+
+
+def stretches(log: Log) -> list[Stretch]:
+    """Every run of rejected intervals, the longest first."""
+    rejected = np.concatenate([[False], ~log.accepted, [False]]).astype(np.int8)
+    edges = np.diff(rejected)
+    speed = log.wind[:, 0] if log.wind.size else None
+    found = []
+    for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        mean = float(speed[begin : end + 1].mean()) if speed is not None else None
+        found.append(Stretch(float(log.time[begin]), float(log.time[end]), int(end - begin), mean))
+    return sorted(found, key=lambda s: (-s.intervals, s.begin))
+
+
+def _quantiles(values: np.ndarray) -> tuple[float, float, float] | None:
+    if not values.size:
+        return None
+    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+    return float(low), float(middle), float(high)
+
+
+def summarise(path: str | os.PathLike[str]) -> LogSummary:
+    """What a log tells, of a damaged one as far as it can be read (then `lost` says why).
+
+    Raises LogError for a file that is missing or no turbine log.
+    """
+    log = read_log(path, partial=True)
+    intervals = len(log.time) - 1
+    summary = LogSummary(
+        path=Path(path),
+        size=Path(path).stat().st_size,
+        rows=len(log.time),
+        duration=log.duration,
+        rate=intervals / log.duration if log.duration else None,
+        run=log.run,
+        result=log.result,
+        attachments={name: len(data) for name, data in log.attachments.items()},
+        complete=log.complete,
+        lost=log.lost,
+        extremes=extremes(log),
+    )
+    # Without a threshold nothing was tested, and "100 % accepted" would praise a plain Runge-Kutta method.
+    guarded = log.accepted.size and not (np.isnan(log.threshold).all() and log.accepted.all())
+    if guarded:
+        summary.acceptance_rate = float(log.accepted.mean())
+        summary.rejected = int((~log.accepted).sum())
+        summary.rejections = stretches(log)
+        if log.wind.size:
+            speed = log.wind[1:, 0]
+            summary.rejected_wind = _quantiles(speed[~log.accepted])
+            summary.accepted_wind = _quantiles(speed[log.accepted])
+    return summary
