@@ -7,10 +7,11 @@ fastmath: the ranges and means must be the same bits as those of the PyPI packag
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from fatigue_runner.compiled import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def reversals(series, points):
     """Write reversals and ends of `series` (n >= 3) to `points` (n,); return how many, 0 for a constant.
 
@@ -31,7 +32,7 @@ def reversals(series, points):
     return count + 1 if slope != 0.0 else 0
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def three_point(points, residue_count, ranges, means, counts):
     """ASTM E1049-85, 5.4.4 on the reversals `points`, which it overwrites; return the number of cycles.
 

@@ -56,7 +56,7 @@ def _run(turbine, tableau, step, steps, winds, initial, plan: OutputPlan, pitch)
     from fatigue_runner.wind import stack_cells
 
     data = turbine.kernel_data(pitch)
-    cell_duration, cells = stack_cells(winds, max(steps * step, float(plan.time[-1])))
+    cell_duration, cells = stack_cells(winds, float(plan.time[-1]))
     changing = bool(np.any(cells[:, 1:])) or len(cells) > 1
     groups = to_groups(np.ascontiguousarray(initial.T))
     # one group's cells: (n_cells, 4, 3 * LANES)

@@ -7,8 +7,8 @@ against a bound. Loops over the state have the constant length WIDTH, so that th
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from fatigue_runner.compiled import FAST, njit
 from fatigue_runner.turbine.generated import kernel
 from fatigue_runner.turbine.generated.kernel import LANES
 
@@ -16,14 +16,13 @@ _rhs = kernel.rhs
 WIDTH = 16 * LANES
 HALF = 8 * LANES
 WIND = 3 * LANES
-FAST = {"fastmath": True, "error_model": "numpy", "boundscheck": False, "cache": True, "nogil": True}
 
 # No state of this turbine comes near these values; beyond them a case has diverged. Azimuths grow without limit.
 STATE_BOUND = 1e4
 AZIMUTH_BOUND = 1e9
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")
 def diverged(x, time, diverged_at, previous, bad):
     """Mark lanes whose state left the bounds or is no number, and put them back so that they stay finite."""
     for j in range(LANES):
@@ -45,7 +44,8 @@ def diverged(x, time, diverged_at, previous, bad):
 @njit(**FAST)
 def wind_at(time, cell_duration, cells, p):
     """Piecewise cubic wind signals: cells (n, 4, WIND) -> p (WIND,)."""
-    i = min(max(int(time / cell_duration), 0), cells.shape[0] - 1)
+    # 0.3 / 0.1 is 2.9999999999999996: a step time belongs to the cell that begins there
+    i = min(max(int(time / cell_duration + 1e-9), 0), cells.shape[0] - 1)
     u = time - i * cell_duration
     for m in range(WIND):
         p[m] = ((cells[i, 3, m] * u + cells[i, 2, m]) * u + cells[i, 1, m]) * u + cells[i, 0, m]

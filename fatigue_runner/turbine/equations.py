@@ -666,8 +666,10 @@ def tower_and_nacelle(sheet: Sheet, top: Motion) -> tuple[dict[str, sp.Expr], di
     mass, force = {}, {}
     for key, tj, wj in (("a", n.t_a, n.w_a), ("s", n.t_s, n.w_s)):
         force[key] = -P["n_m"] * tj.dot(n.acceleration) - wj.dot(spin_moment)
-        for other, tk, wk in (("a", n.t_a, n.w_a), ("s", n.t_s, n.w_s)):
-            mass[key + other] = P["n_m"] * tj.dot(tk) + (tensor * wj).dot(wk)
+    for key, tj, wj, tk, wk in (
+        ("aa", n.t_a, n.w_a, n.t_a, n.w_a), ("as", n.t_a, n.w_a, n.t_s, n.w_s), ("ss", n.t_s, n.w_s, n.t_s, n.w_s),
+    ):  # fmt: skip
+        mass[key] = P["n_m"] * tj.dot(tk) + (tensor * wj).dot(wk)
     mass["aa"] += P["t_maa"]
     mass["ss"] += P["t_mss"]
     # the tower's own weight on its foreshortening softens it
@@ -748,7 +750,7 @@ def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Exp
     for r, i in enumerate(keys):
         right = force[i] - sum(scaled[n, i] * force[f"f{n}"] for n in (1, 2, 3))
         for j in keys[: r + 1]:
-            m_ij = mass.get(i + j, mass.get(j + i))
+            m_ij = mass[i + j] if i + j in mass else mass[j + i]
             s_ij = sheet.let(f"s_{i}{j}", m_ij - sum(scaled[n, i] * column[n, j] for n in (1, 2, 3)))
             for k in keys[: keys.index(j)]:
                 s_ij = s_ij - lower[i, k] * scaled_row[j, k]

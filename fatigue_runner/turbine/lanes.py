@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fatigue_runner.compiled import njit
 from fatigue_runner.turbine.generated import kernel
 from fatigue_runner.turbine.generated.kernel import LANES
 
@@ -21,13 +21,13 @@ _SCRATCH = max(kernel.RHS_ROWS, kernel.LOADS_ROWS) * LANES
 _ROW = 32 * LANES
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _evaluate(x, wind, tables, cells, constants, scratch, row, clamped, out):
     for group in range(x.shape[0]):
         _rhs(x[group], wind[group], out[group], 0, tables, cells, constants, scratch, row, clamped)
 
 
-@njit(cache=True, nogil=True)
+@njit(nogil=True)
 def _load_groups(x, wind, derivative, tables, cells, constants, scratch, row, clamped, out):
     for group in range(x.shape[0]):
         _loads(

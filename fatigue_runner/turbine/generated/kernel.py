@@ -3,10 +3,10 @@
 import math
 
 import numpy as np
-from numba import njit
+from fatigue_runner.compiled import FAST, njit
 
 LANES = 16
-OPTIONS = dict(fastmath=True, error_model="numpy", boundscheck=False, cache=True, nogil=True)
+
 PARAMETERS = ('b_m', 'b_m1', 'b_m2', 'b_fx', 'b_fy', 'b_ex', 'b_ey', 'b_rfx', 'b_rfy', 'b_rex', 'b_rey', 'b_fxfx', 'b_fyfy', 'b_fxfy', 'b_exex', 'b_eyey', 'b_exey', 'b_fxex', 'b_fyey', 'b_fxey', 'b_fyex', 'b_sff', 'b_sfe', 'b_see', 'b_rsff', 'b_rsfe', 'b_rsee', 'b_kf', 'b_ke', 'b_kfe', 'b_df', 'b_de', 'b_tip_fx', 'b_tip_fy', 'b_tip_ex', 'b_tip_ey', 'b_root', 'cos_pitch', 'sin_pitch', 'cos_cone', 'sin_cone', 'cos_tilt', 'sin_tilt', 'h_m', 'h_ixx', 'h_itt', 'overhang', 'tower_to_shaft', 'n_m', 'n_x', 'n_y', 'n_z', 'n_ixx', 'n_iyy', 'n_izz', 'g_i', 'g_ratio', 'd_k', 'd_d', 't_h', 't_maa', 't_mss', 't_fa', 't_ss', 't_zfa', 't_zss', 't_slope_fa', 't_slope_ss', 't_short_fa', 't_short_ss', 't_gfa', 't_gss', 't_ka', 't_ks', 't_da', 't_ds', 'gravity', 'radius', 'q_area', 'tg_k', 'tg_w1', 'tg_w2', 'tg_a1', 'tg_w3', 'tg_a2', 'tg_ws', 'tg_w4', 'tg_p', 'tg_t')
 TABLES = ('thrust', 'thrust_kappa', 'thrust_y', 'thrust_flap', 'thrust_edge', 'flap', 'flap_kappa', 'flap_y', 'flap_flap', 'flap_edge', 'torque', 'torque_kappa', 'torque_y', 'torque_flap', 'torque_edge', 'edge', 'edge_flap', 'edge_edge', 'tangential_kappa', 'tangential_y', 'tangential_flap', 'bending_kappa', 'bending_y', 'bending_flap', 'tangential', 'tangential_edge', 'bending', 'bending_edge', 'edge_kappa', 'edge_y')
 EQUATION_TABLES = 24
@@ -378,7 +378,7 @@ RHS_ROWS = 45
 LOADS_ROWS = 52
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def rhs(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
     """State derivative of LANES cases: x, out[start:] in blocks (16, LANES), wind (3, LANES)."""
     b_fx = constants[3]
@@ -1111,7 +1111,7 @@ def rhs(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
         s_sp = ang_s_x - m_f1p*y_1s - m_f2p*y_2s - m_f3p*y_3s
         v_sp = -l_se*s_pe + s_sp
         l_sp = inv_p*v_sp
-        s_sa = -m_f1a*y_1s - m_f2a*y_2s - m_f3a*y_3s + n_m*(nac_ta_x*ts_x + nac_ta_y*nac_ts_y + nac_ta_z*nac_ts_z)
+        s_sa = ang_s_x*wha_s_x + ang_s_y*wha_y + ang_s_z*wha_z - m_f1a*y_1s - m_f2a*y_2s - m_f3a*y_3s + mom_s_x*tha_s_x + mom_s_y*tha_y + mom_s_z*tha_z + n_m*(nac_ta_x*ts_x + nac_ta_y*nac_ts_y + nac_ta_z*nac_ts_z)
         v_sa = -l_se*s_ae - l_sp*v_ap + s_sa
         l_sa = inv_a*v_sa
         s_ss = ang_s_x*whs_s_x + ang_s_y*whs_y + ang_s_z*whs_z - m_f1s*y_1s - m_f2s*y_2s - m_f3s*y_3s + mom_s_x*ths_s_x + mom_s_y*ths_y + mom_s_z*ths_z + n_ixx*(t_slope_ss*t_slope_ss) + n_m*((nac_ts_y*nac_ts_y) + (nac_ts_z*nac_ts_z) + (ts_x*ts_x)) + t_mss
@@ -1144,7 +1144,7 @@ def rhs(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
         out[start + 15 * LANES + j] = x_gen
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def loads(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped):
     """Load channels of LANES states: x, derivative (16, LANES), wind (3, LANES), out (n_loads, LANES)."""
     b_m = constants[0]

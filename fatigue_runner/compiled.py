@@ -1,0 +1,77 @@
+"""numba with a cache that is keyed by the sources of all compiled functions.
+
+numba's own cache looks at the file of a function only: it would go on running a stepping loop with an old kernel inlined after
+the kernel has changed. Here every change of any file that compiles something gets a cache folder of its own.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import warnings
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import config
+
+# `fastmath=True` lets LLVM assume that there is no NaN: no divergence check may stand in a function compiled with it.
+FAST = {"fastmath": True, "error_model": "numpy", "boundscheck": False, "nogil": True}
+
+_KEPT = 8  # cache folders of earlier versions that stay
+
+
+@cache
+def cache_folder() -> Path:
+    """The folder of compiled kernels: under NUMBA_CACHE_DIR where that is set, else the user's cache folder."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    package = Path(__file__).parent
+    for path in sorted(package.rglob("*.py")):
+        source = path.read_bytes()
+        if b"fatigue_runner.compiled" in source:
+            digest.update(source)
+    base = config.CACHE_DIR or os.path.join(
+        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "fatigue-runner"
+    )
+    _prune(Path(base))
+    return Path(base) / f"kernels-{digest.hexdigest()[:16]}"
+
+
+def _prune(base: Path) -> None:
+    """Drop the oldest folders, so that the cache does not grow with every version."""
+    import shutil
+
+    try:
+        folders = sorted(base.glob("kernels-*"), key=lambda p: p.stat().st_mtime)
+    except OSError:
+        return
+    for folder in folders[:-_KEPT]:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def njit(**options: Any) -> Callable[[Callable], Callable]:
+    """`numba.njit(cache=True, **options)` with the keyed cache; without a writable one it warns and compiles every time."""
+
+    def decorate(function: Callable) -> Callable:
+        before = config.CACHE_DIR
+        config.CACHE_DIR = str(cache_folder())
+        try:
+            return numba.njit(cache=True, **options)(function)
+        except (RuntimeError, OSError):
+            _warn_once()
+            return numba.njit(**options)(function)
+        finally:
+            config.CACHE_DIR = before
+
+    return decorate
+
+
+@cache
+def _warn_once() -> None:
+    warnings.warn(
+        f"the kernel cache {cache_folder()} cannot be written: kernels are compiled anew in every process (seconds); "
+        "set NUMBA_CACHE_DIR to a writable folder",
+        stacklevel=3,
+    )

@@ -1,0 +1,258 @@
+"""Quasi-steady blade-element-momentum theory of one rotor: the loads of a blade in an equilibrium wake.
+
+Frames and signs: e1 normal to the coned blade, downwind; e3 along the span; e2 = e3 x e1, towards the trailing
+edge, against the motion. r is the distance from the rotor apex along e3. Everything is in units of the wind speed
+V along the shaft: velocities by V, loads of ONE blade by (1/3) * rho/2 * A * V^2 * [R], with R = tip_radius *
+cos(cone) and A = pi R^2, so that the rotor's coefficient is the mean of its blades'.
+
+The inflow angle solves one equation per blade station (Ning, Wind Energy 17, 2014, doi 10.1002/we.1636), with
+Prandtl's tip and hub loss, Buhl's empirical thrust at high induction (NREL/TP-500-36834, 2005), tangential
+induction, and without drag in the momentum balance (as in the reference turbine's OpenFAST model); drag is in the loads.
+Two choices make the loads smooth, so that splines through their tables converge:
+- polars are monotone cubics through their points, averaged over a window of angles that the turbine file sets, because the kinks of
+  static stall are not in the flow;
+- Buhl's parabola is carried on beyond an axial induction of 1 (reversed flow through the disc), where the branch of the propeller
+  brake would jump. This matters at tip-speed ratios above 12 with pitch below 0 only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.turbine.beam import BladeModes, columns
+
+Array = NDArray[np.float64]
+Polar = Callable[[Array], Array]
+
+LOAD_NAMES = ("thrust", "tangential", "torque", "bending", "flap", "edge")
+
+
+@dataclass(frozen=True)
+class BladeAerodynamics:
+    """What the aerodynamics know of a blade. n stations, without the unloaded ones at hub and tip.
+
+    radius, chord (n,) [m], twist (n,) [rad]; cone [rad]; lift, drag: per station, the coefficient as function
+    of the angle of attack [rad]; shapes (n, 4): phi_x, phi_y, psi_x, psi_y at the stations, at zero pitch;
+    weights (6, n): the integral over the blade of 1, r, phi_x, phi_y, psi_x, psi_y times a load that is 1 at one
+    station, 0 at the others and linear in between.
+    """
+
+    blades: int
+    hub_radius: float
+    tip_radius: float
+    cone: float
+    radius: Array
+    chord: Array
+    twist: Array
+    lift: tuple[Polar, ...]
+    drag: tuple[Polar, ...]
+    shapes: Array
+    weights: Array
+
+    @property
+    def rotor_radius(self) -> float:
+        """R: the radius that the tips sweep [m]."""
+        return float(self.tip_radius * np.cos(self.cone))
+
+
+def blade_aerodynamics(
+    parameters: Mapping[str, Any], airfoils: Mapping[str, Any], modes: BladeModes
+) -> BladeAerodynamics:
+    """From a turbine file, its airfoil file and its blade modes. Raises InputError for an airfoil without polar."""
+    aerodynamics, geometry = parameters["aerodynamics"], parameters["geometry"]
+    stations = columns(aerodynamics["stations"])
+    span, radius = stations["span"], modes.hub_radius + stations["span"]
+    if not (span[0] == 0 and np.all(np.diff(span) > 0) and np.isclose(radius[-1], modes.tip_radius)):
+        raise InputError(
+            "aerodynamics: stations: span must rise from 0 at the root to the length of the blade"
+        )
+    polars = _smooth_polars(airfoils, aerodynamics["polar_smoothing_deg"])
+    for name in stations["airfoil"]:
+        if name not in polars:
+            raise InputError(
+                f"aerodynamics: stations: no polar of airfoil {name!r}{did_you_mean(name, polars)}"
+            )
+    grid = modes.grid
+    carried = np.column_stack([np.ones_like(grid), grid, modes.flap, modes.edge])
+    steps = np.gradient(grid) * np.where((grid == grid[0]) | (grid == grid[-1]), 0.5, 1.0)  # trapezoids
+    hats = np.stack([np.interp(grid, radius, unit) for unit in np.eye(len(radius))[1:-1]])
+    inner = slice(1, -1)
+    lift, drag = zip(*(polars[name] for name in stations["airfoil"][inner]), strict=True)
+    return BladeAerodynamics(
+        blades=int(geometry["blades"]),
+        hub_radius=modes.hub_radius,
+        tip_radius=modes.tip_radius,
+        cone=float(np.radians(geometry["precone_deg"])),
+        radius=radius[inner],
+        chord=stations["chord"][inner],
+        twist=np.radians(stations["twist_deg"][inner]),
+        lift=lift,
+        drag=drag,
+        shapes=np.concatenate([modes.flap_at(radius[inner]), modes.edge_at(radius[inner])], axis=1),
+        weights=(hats * steps @ carried).T,
+    )
+
+
+def rotor_loads(
+    blade: BladeAerodynamics,
+    tip_speed_ratio: ArrayLike,
+    pitch: ArrayLike,
+    kappa: ArrayLike = 0.0,
+    y: ArrayLike = 0.0,
+    flap: ArrayLike = 0.0,
+    edge: ArrayLike = 0.0,
+) -> Array:
+    """Coefficients (6, ...) of LOAD_NAMES of one blade; the arguments broadcast against each other.
+
+    tip_speed_ratio: rotor speed * R / V; pitch [rad], positive to feather. kappa: the wind at r is V (1 + kappa
+    r / R). y: uniform in-plane air velocity along e2, by V. flap, edge: modal velocities by V; pitch turns the modes.
+    Torque and bending are moments about the apex; flap and edge are generalised forces of the modes.
+    """
+    arguments = [np.asarray(v, dtype=float) for v in (tip_speed_ratio, pitch, kappa, y, flap, edge)]
+    shape = np.broadcast_shapes(*(v.shape for v in arguments))
+    lam, theta, kappa, y, flap, edge = (np.broadcast_to(v, shape).reshape(-1, 1) for v in arguments)
+    r, big_r, cos_cone = blade.radius, blade.rotor_radius, np.cos(blade.cone)
+    c, s = np.cos(theta), np.sin(theta)
+    flap_x, flap_y, edge_x, edge_y = blade.shapes.T
+    speed_x = flap * flap_x + edge * edge_x  # structural velocity in the axes that turn with pitch
+    speed_y = flap * flap_y + edge * edge_y
+    normal = (1.0 + kappa * r / big_r) * cos_cone - (c * speed_x + s * speed_y)
+    in_plane = lam * r / big_r * cos_cone + y - (c * speed_y - s * speed_x)
+    angle = inflow_angle(blade, normal, in_plane, theta)
+    attack = angle - blade.twist - theta
+    lift, drag = (_coefficient(polars, attack) for polars in (blade.lift, blade.drag))
+    ratio, _ = _balance(blade, lift, angle)
+    pressure = blade.chord * (normal / ratio) ** 2 * (3.0 / (np.pi * big_r**2))
+    along_1 = pressure * (lift * np.cos(angle) + drag * np.sin(angle))
+    driving = pressure * (lift * np.sin(angle) - drag * np.cos(angle))
+    n, t = (along_1 @ blade.weights.T).T, (driving @ blade.weights.T).T
+    c, s = c[:, 0], s[:, 0]
+    loads = [
+        n[0],
+        t[0],
+        t[1] / big_r,
+        n[1] / big_r,
+        *((c * n[i] + s * n[i + 1]) - (c * t[i + 1] - s * t[i]) for i in (2, 4)),
+    ]
+    return np.stack(loads).reshape(len(LOAD_NAMES), *shape)
+
+
+def power_coefficient(blade: BladeAerodynamics, tip_speed_ratio: ArrayLike, pitch: ArrayLike) -> Array:
+    """Shaft power of the rotor in uniform wind by rho/2 A V^3."""
+    torque = rotor_loads(blade, tip_speed_ratio, pitch)[LOAD_NAMES.index("torque")]
+    return np.asarray(tip_speed_ratio) * torque * np.cos(blade.cone)
+
+
+def thrust_coefficient(blade: BladeAerodynamics, tip_speed_ratio: ArrayLike, pitch: ArrayLike) -> Array:
+    """Thrust of the rotor along the shaft in uniform wind by rho/2 A V^2."""
+    return rotor_loads(blade, tip_speed_ratio, pitch)[LOAD_NAMES.index("thrust")] * np.cos(blade.cone)
+
+
+def inflow_angle(blade: BladeAerodynamics, normal: Array, in_plane: Array, pitch: Array) -> Array:
+    """Angle of the induced flow to the rotor plane [rad], (m, n), from velocities (m, n) and pitch (m, 1) [rad].
+
+    The equation has one root between reversed flow and flow along the shaft for the polars of wind turbine blades;
+    Chandrupatla's bracketing method (Advances in Engineering Software 28, 1997) finds it to rounding.
+    """
+
+    def residual(angle: Array) -> Array:
+        lift = _coefficient(blade.lift, angle - blade.twist - pitch)
+        ratio, tangential = _balance(blade, lift, angle)
+        # Reversed flow with a negative load has no equilibrium: that is below the root.
+        return np.where((angle <= 0) & (lift <= 0), -1e3, ratio * in_plane - tangential * normal)
+
+    low = np.full(np.broadcast_shapes(normal.shape, in_plane.shape), -0.5 * np.pi + 1e-3)
+    # Up to 108 deg, because a perturbation can turn the in-plane flow round near the hub of a slow rotor.
+    return _find_root(residual, low, np.full_like(low, 0.6 * np.pi))
+
+
+def _balance(blade: BladeAerodynamics, lift: Array, angle: Array) -> tuple[Array, Array]:
+    """sin(phi)/(1-a) and cos(phi)/(1+a'): normal and in-plane velocity, each by the induced speed, in equilibrium.
+
+    Written so that nothing is singular at phi = 0. With k = loading/sin^2: a = k/(1+k) up to k = 2/3, beyond it
+    4 F k (1-a)^2 = 8/9 + (4F - 40/9) a + (50/9 - 4F) a^2 (Buhl), which is quadratic in sin(phi)/(1-a).
+    """
+    s, c = np.sin(angle), np.cos(angle)
+    solidity = blade.blades * blade.chord / (2 * np.pi * blade.radius * np.cos(blade.cone))
+    loss = _loss(blade, s)
+    swirl = solidity * lift / (4 * loss)
+    loading = swirl * c
+    b = 20 / 3 - 4 * loss
+    root = np.sqrt(np.maximum((b * s) ** 2 - 8 * ((50 / 9 - 4 * loss) * s**2 - 4 * loss * loading), 0.0))
+    momentum = (s > 0) & (loading <= 2 / 3 * s**2)
+    ratio = np.where(momentum, s + loading / np.where(momentum, s, 1.0), (b * s + root) / 4)
+    return ratio, c - swirl
+
+
+def _loss(blade: BladeAerodynamics, sine: Array) -> Array:
+    """Prandtl's tip and hub loss factor; at least 1e-4, as the momentum balance divides by it."""
+    r, half = blade.radius, blade.blades / 2
+    slope = np.maximum(np.abs(sine), 1e-9)
+    tip = np.arccos(np.exp(-half * (blade.tip_radius - r) / (r * slope)))
+    hub = np.arccos(np.exp(-half * (r - blade.hub_radius) / (blade.hub_radius * slope)))
+    return np.maximum((2 / np.pi) ** 2 * tip * hub, 1e-4)
+
+
+def _smooth_polars(airfoils: Mapping[str, Any], width_deg: float) -> dict[str, tuple[Polar, Polar]]:
+    """Lift and drag of each airfoil over the angle of attack [rad]: monotone cubics, averaged over +- width/2."""
+    from scipy.interpolate import PchipInterpolator  # only the table builder needs scipy
+
+    def smooth(attack: Array, values: Array) -> Polar:
+        curve = PchipInterpolator(attack, values)
+        area, half = curve.antiderivative(), np.radians(width_deg) / 2
+        return curve if half == 0 else lambda at: (area(at + half) - area(at - half)) / (2 * half)
+
+    polars = {}
+    for name, points in airfoils["airfoils"].items():
+        table = np.array(points, dtype=float)
+        if table.ndim != 2 or table.shape[1] != 3 or not np.all(np.diff(table[:, 0]) > 0):
+            raise InputError(
+                f"airfoil {name!r}: rows of rising angle_of_attack_deg, lift and drag are needed"
+            )
+        if not (table[0, 0] <= -180 and table[-1, 0] >= 180):
+            raise InputError(f"airfoil {name!r}: the polar must reach from -180 to 180 deg")
+        attack = np.radians(table[:, 0])
+        polars[name] = smooth(attack, table[:, 1]), smooth(attack, table[:, 2])
+    return polars
+
+
+def _coefficient(polars: tuple[Polar, ...], attack: Array) -> Array:
+    """Coefficients (m, n) at the angles of attack (m, n) [rad] of the n stations."""
+    return np.stack([polar(attack[:, i]) for i, polar in enumerate(polars)], axis=1)
+
+
+def _find_root(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    """Elementwise root between low and high, where the function changes sign."""
+    a, b = high, low
+    fa, fb = function(a), function(b)
+    if np.any(np.sign(fa) * np.sign(fb) > 0):
+        raise InputError(
+            "blade-element momentum: no equilibrium between reversed and axial flow for this blade"
+        )
+    c, fc, t = a, fa, np.full_like(a, 0.5)
+    for _ in range(100):
+        x = a + t * (b - a)
+        fx = function(x)
+        same = np.sign(fx) == np.sign(fa)
+        c, fc = np.where(same, a, b), np.where(same, fa, fb)
+        b, fb = np.where(same, b, a), np.where(same, fb, fa)
+        a, fa = x, fx
+        best = np.where(np.abs(fa) < np.abs(fb), a, b)
+        width = np.abs(b - a)
+        tolerance = 0.5 * (2e-15 + 4e-16 * np.abs(best)) / np.maximum(width, 1e-300)
+        if np.all((tolerance > 0.5) | (fa == 0) | (fb == 0)):
+            return best
+        with np.errstate(divide="ignore", invalid="ignore"):
+            xi, phi = (a - b) / (c - b), (fa - fb) / (fc - fb)
+            inverse = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+        smooth = (phi**2 < xi) & ((1 - phi) ** 2 < 1 - xi)
+        t = np.clip(
+            np.where(smooth, inverse, 0.5), np.minimum(tolerance, 0.5), 1 - np.minimum(tolerance, 0.5)
+        )
+    raise ArithmeticError("blade-element momentum: no equilibrium found within 100 steps")

@@ -1,0 +1,88 @@
+"""From a blade's aerodynamics to the coefficient tables that the simulation reads: six loads and their derivatives.
+
+Every load is linear in the perturbations that rotor_loads describes: X + kappa X_kappa + y X_y + f X_flap + e X_edge.
+The derivatives are central differences whose steps turn the flow at the tip by about half a degree, as gusts, tilt and
+vibration do, so that a kink of stall becomes the slope across it. Above tip-speed ratio 6 the derivatives with a
+tenth of these steps differ by less than 2 % of the largest.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fatigue_runner.turbine.aerodynamics import LOAD_NAMES, BladeAerodynamics, blade_aerodynamics, rotor_loads
+from fatigue_runner.turbine.beam import blade_modes
+
+Array = NDArray[np.float64]
+
+# Half widths of the central differences, by the wind speed; those in the rotor plane grow with the tip-speed ratio,
+# so that they turn the flow as much as the others and yet never turn it round near the hub.
+STEPS = {"kappa": 0.05, "y": 0.02, "flap": 0.05, "edge": 0.05}
+IN_PLANE = ("y", "edge")
+TABLE_NAMES = tuple(name + suffix for name in LOAD_NAMES for suffix in ("", *(f"_{step}" for step in STEPS)))
+
+TIP_SPEED_RATIO = np.linspace(0.5, 15.0, 117)
+PITCH_DEG = np.concatenate([np.arange(-5.0, 10.0, 0.5), np.arange(10.0, 30.5, 1.0)])
+
+_FORMAT = 1  # raise when the method changes, so that tables made before are known to be old
+
+
+def load_coefficients(blade: BladeAerodynamics, tip_speed_ratio: Array, pitch: Array) -> Array:
+    """Loads and derivatives (30, ...) in the order of TABLE_NAMES; the arguments broadcast, pitch in rad."""
+    rows = [rotor_loads(blade, tip_speed_ratio, pitch)]
+    for name, size in STEPS.items():
+        step = size * (tip_speed_ratio if name in IN_PLANE else np.ones_like(tip_speed_ratio))
+        above, below = (rotor_loads(blade, tip_speed_ratio, pitch, **{name: s}) for s in (step, -step))
+        rows.append((above - below) / (2 * step))
+    return np.stack(rows, axis=1).reshape(len(TABLE_NAMES), *rows[0].shape[1:])
+
+
+def build_tables(
+    blade: BladeAerodynamics, tip_speed_ratio: Array = TIP_SPEED_RATIO, pitch_deg: Array = PITCH_DEG
+) -> Array:
+    """Coefficients (30, n, k) of TABLE_NAMES over tip-speed ratios (n,) and pitch angles (k,) [deg]."""
+    return np.stack([load_coefficients(blade, tip_speed_ratio, np.radians(p)) for p in pitch_deg], axis=-1)
+
+
+def turbine_blade(parameters: Mapping[str, Any]) -> tuple[BladeAerodynamics, str]:
+    """The blade of a turbine file as read by parameters.read_turbine_file, and the hash of what its tables depend on."""
+    from ruamel.yaml import YAML
+
+    path = Path(parameters["folder"]) / parameters["aerodynamics"]["airfoils"]
+    airfoils = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    blade = blade_aerodynamics(parameters, airfoils, blade_modes(parameters))
+    return blade, inputs_hash(parameters, airfoils)
+
+
+def inputs_hash(parameters: Mapping[str, Any], airfoils: Mapping[str, Any]) -> str:
+    """SHA-256 of everything that the tables of a turbine depend on, method and grid included."""
+    geometry, blade, aerodynamics = (parameters[k] for k in ("geometry", "blade", "aerodynamics"))
+    inputs = {
+        "format": _FORMAT,
+        "steps": STEPS,
+        "grid": [TIP_SPEED_RATIO.tolist(), PITCH_DEG.tolist()],
+        "geometry": {k: geometry[k] for k in ("blades", "hub_radius", "tip_radius", "precone_deg")},
+        "shapes": [blade["flap_mode"], blade["edge_mode"], blade["stations"]],
+        "aerodynamics": {k: v for k, v in aerodynamics.items() if k not in ("tables", "interpolation")},
+        "airfoils": airfoils["airfoils"],
+    }
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+
+
+def write_tables(path: Path, coefficients: Array, inputs: str) -> None:
+    """Write an npz: names (30,), tip_speed_ratio (n,), pitch (k,) [rad], coefficients (30, n, k), inputs (hash)."""
+    np.savez_compressed(
+        path,
+        names=np.array(TABLE_NAMES),
+        tip_speed_ratio=TIP_SPEED_RATIO,
+        pitch=np.radians(PITCH_DEG),
+        coefficients=coefficients,
+        inputs=np.array(inputs),
+    )
