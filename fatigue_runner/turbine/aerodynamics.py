@@ -1,18 +1,18 @@
 """Quasi-steady blade-element-momentum theory of one rotor: the loads of a blade in an equilibrium wake.
 
-Frames and signs: e1 normal to the coned blade, downwind; e3 along the span; e2 = e3 x e1, towards the trailing
-edge, against the motion. r is the distance from the rotor apex along e3. Everything is in units of the wind speed
-V along the shaft: velocities by V, loads of ONE blade by (1/3) * rho/2 * A * V^2 * [R], with R = tip_radius *
-cos(cone) and A = pi R^2, so that the rotor's coefficient is the mean of its blades'.
+Frames and signs: e1 normal to the coned blade, downwind; e3 along the span; e2 = e3 x e1, towards the
+trailing edge, against the motion. r is the distance from the rotor apex along e3. Everything is in units of
+the wind speed V along the shaft: velocities by V, loads of ONE blade by (1/3) * rho/2 * A * V^2 * [R], with
+R = tip_radius * cos(cone) and A = pi R^2, so that the rotor's coefficient is the mean of its blades'.
 
 The inflow angle solves one equation per blade station (Ning, Wind Energy 17, 2014, doi 10.1002/we.1636), with
 Prandtl's tip and hub loss, Buhl's empirical thrust at high induction (NREL/TP-500-36834, 2005), tangential
-induction, and without drag in the momentum balance (as in the reference turbine's OpenFAST model); drag is in the loads.
-Two choices make the loads smooth, so that splines through their tables converge:
-- polars are monotone cubics through their points, averaged over a window of angles that the turbine file sets, because the kinks of
-  static stall are not in the flow;
-- Buhl's parabola is carried on beyond an axial induction of 1 (reversed flow through the disc), where the branch of the propeller
-  brake would jump. This matters at tip-speed ratios above 12 with pitch below 0 only.
+induction, and without drag in the momentum balance (as in the reference turbine's OpenFAST model); drag is
+in the loads. Two choices make the loads smooth, so that splines through their tables converge:
+- polars are monotone cubics through their points, averaged over a window of angles that the turbine file
+  sets, because the kinks of static stall are not in the flow;
+- Buhl's parabola is carried on beyond an axial induction of 1 (reversed flow through the disc), where the
+  branch of the propeller brake would jump. This matters at tip-speed ratios above 12 with pitch below 0 only.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class BladeAerodynamics:
 
     radius, chord (n,) [m], twist (n,) [rad]; cone [rad]; lift, drag: per station, the coefficient as function
     of the angle of attack [rad]; shapes (n, 4): phi_x, phi_y, psi_x, psi_y at the stations, at zero pitch;
-    weights (6, n): the integral over the blade of 1, r, phi_x, phi_y, psi_x, psi_y times a load that is 1 at one
-    station, 0 at the others and linear in between.
+    weights (6, n): the integral over the blade of 1, r, phi_x, phi_y, psi_x, psi_y times a load that is 1 at
+    one station, 0 at the others and linear in between.
     """
 
     blades: int
@@ -64,7 +64,10 @@ class BladeAerodynamics:
 def blade_aerodynamics(
     parameters: Mapping[str, Any], airfoils: Mapping[str, Any], modes: BladeModes
 ) -> BladeAerodynamics:
-    """From a turbine file, its airfoil file and its blade modes. Raises InputError for an airfoil without polar."""
+    """From a turbine file, its airfoil file and its blade modes.
+
+    Raises InputError for an airfoil without polar and for stations that do not span the blade.
+    """
     aerodynamics, geometry = parameters["aerodynamics"], parameters["geometry"]
     stations = columns(aerodynamics["stations"])
     span, radius = stations["span"], modes.hub_radius + stations["span"]
@@ -110,9 +113,10 @@ def rotor_loads(
 ) -> Array:
     """Coefficients (6, ...) of LOAD_NAMES of one blade; the arguments broadcast against each other.
 
-    tip_speed_ratio: rotor speed * R / V; pitch [rad], positive to feather. kappa: the wind at r is V (1 + kappa
-    r / R). y: uniform in-plane air velocity along e2, by V. flap, edge: modal velocities by V; pitch turns the modes.
-    Torque and bending are moments about the apex; flap and edge are generalised forces of the modes.
+    tip_speed_ratio: rotor speed * R / V; pitch [rad], positive to feather. kappa: the wind at r is V (1 +
+    kappa r / R). y: uniform in-plane air velocity along e2, by V. flap, edge: modal velocities by V; pitch
+    turns the modes. Torque and bending are moments about the apex; flap and edge are generalised forces of
+    the modes.
     """
     arguments = [np.asarray(v, dtype=float) for v in (tip_speed_ratio, pitch, kappa, y, flap, edge)]
     shape = np.broadcast_shapes(*(v.shape for v in arguments))
@@ -155,10 +159,10 @@ def thrust_coefficient(blade: BladeAerodynamics, tip_speed_ratio: ArrayLike, pit
 
 
 def inflow_angle(blade: BladeAerodynamics, normal: Array, in_plane: Array, pitch: Array) -> Array:
-    """Angle of the induced flow to the rotor plane [rad], (m, n), from velocities (m, n) and pitch (m, 1) [rad].
+    """Angle of the induced flow to the rotor plane [rad], (m, n); velocities (m, n), pitch (m, 1) [rad].
 
-    The equation has one root between reversed flow and flow along the shaft for the polars of wind turbine blades;
-    Chandrupatla's bracketing method (Advances in Engineering Software 28, 1997) finds it to rounding.
+    The equation has one root between reversed flow and flow along the shaft for the polars of wind turbine
+    blades; Chandrupatla's bracketing method (Advances in Engineering Software 28, 1997) finds it to rounding.
     """
 
     def residual(angle: Array) -> Array:
@@ -173,10 +177,10 @@ def inflow_angle(blade: BladeAerodynamics, normal: Array, in_plane: Array, pitch
 
 
 def _balance(blade: BladeAerodynamics, lift: Array, angle: Array) -> tuple[Array, Array]:
-    """sin(phi)/(1-a) and cos(phi)/(1+a'): normal and in-plane velocity, each by the induced speed, in equilibrium.
+    """sin(phi)/(1-a) and cos(phi)/(1+a'): normal and in-plane velocity by the induced speed, in equilibrium.
 
-    Written so that nothing is singular at phi = 0. With k = loading/sin^2: a = k/(1+k) up to k = 2/3, beyond it
-    4 F k (1-a)^2 = 8/9 + (4F - 40/9) a + (50/9 - 4F) a^2 (Buhl), which is quadratic in sin(phi)/(1-a).
+    Written so that nothing is singular at phi = 0. With k = loading/sin^2: a = k/(1+k) up to k = 2/3, beyond
+    it 4 F k (1-a)^2 = 8/9 + (4F - 40/9) a + (50/9 - 4F) a^2 (Buhl), which is quadratic in sin(phi)/(1-a).
     """
     s, c = np.sin(angle), np.cos(angle)
     solidity = blade.blades * blade.chord / (2 * np.pi * blade.radius * np.cos(blade.cone))
@@ -200,7 +204,7 @@ def _loss(blade: BladeAerodynamics, sine: Array) -> Array:
 
 
 def _smooth_polars(airfoils: Mapping[str, Any], width_deg: float) -> dict[str, tuple[Polar, Polar]]:
-    """Lift and drag of each airfoil over the angle of attack [rad]: monotone cubics, averaged over +- width/2."""
+    """Lift and drag of each airfoil over the angle of attack [rad]: monotone cubics, then averaged."""
     from scipy.interpolate import PchipInterpolator  # only the table builder needs scipy
 
     def smooth(attack: Array, values: Array) -> Polar:

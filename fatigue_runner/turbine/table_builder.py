@@ -1,9 +1,9 @@
-"""From a blade's aerodynamics to the coefficient tables that the simulation reads: six loads and their derivatives.
+"""The coefficient tables that the simulation reads: six loads of a blade and their derivatives.
 
-Every load is linear in the perturbations that rotor_loads describes: X + kappa X_kappa + y X_y + f X_flap + e X_edge.
-The derivatives are central differences whose steps turn the flow at the tip by about half a degree, as gusts, tilt and
-vibration do, so that a kink of stall becomes the slope across it. Above tip-speed ratio 6 the derivatives with a
-tenth of these steps differ by less than 2 % of the largest.
+Every load is linear in the perturbations that rotor_loads describes: X + kappa X_kappa + y X_y + f X_flap +
+e X_edge. The derivatives are central differences whose steps turn the flow at the tip by about half a
+degree, as gusts, tilt and vibration do, so that a kink of stall becomes the slope across it. Above tip-speed
+ratio 7 the derivatives with a tenth of these steps differ by less than 4 % of the largest.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from fatigue_runner.turbine.beam import blade_modes
 
 Array = NDArray[np.float64]
 
-# Half widths of the central differences, by the wind speed; those in the rotor plane grow with the tip-speed ratio,
-# so that they turn the flow as much as the others and yet never turn it round near the hub.
+# Half widths of the central differences, by the wind speed; those in the rotor plane grow with the tip-speed
+# ratio, so that they turn the flow as much as the others and yet never turn it round near the hub.
 STEPS = {"kappa": 0.05, "y": 0.02, "flap": 0.05, "edge": 0.05}
 IN_PLANE = ("y", "edge")
 TABLE_NAMES = tuple(name + suffix for name in LOAD_NAMES for suffix in ("", *(f"_{step}" for step in STEPS)))
@@ -52,7 +52,7 @@ def build_tables(
 
 
 def turbine_blade(parameters: Mapping[str, Any]) -> tuple[BladeAerodynamics, str]:
-    """The blade of a turbine file as read by parameters.read_turbine_file, and the hash of what its tables depend on."""
+    """The blade of a mapping from parameters.read_turbine_file, and the hash of what its tables depend on."""
     from ruamel.yaml import YAML
 
     path = Path(parameters["folder"]) / parameters["aerodynamics"]["airfoils"]
@@ -77,7 +77,7 @@ def inputs_hash(parameters: Mapping[str, Any], airfoils: Mapping[str, Any]) -> s
 
 
 def write_tables(path: Path, coefficients: Array, inputs: str) -> None:
-    """Write an npz: names (30,), tip_speed_ratio (n,), pitch (k,) [rad], coefficients (30, n, k), inputs (hash)."""
+    """Write an npz: names (30,), tip_speed_ratio (n,), pitch (k,) [rad], coefficients (30, n, k), inputs."""
     np.savez_compressed(
         path,
         names=np.array(TABLE_NAMES),
