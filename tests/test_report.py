@@ -339,3 +339,19 @@ def test_a_finished_campaign_says_that_nothing_is_lost(tmp_path):
     run = load_run(write_run(tmp_path / "run", example_rows(diverging=False)))
     first = build("cases", run).blocks[0]
     assert isinstance(first, Paragraph) and first.text == "All 60 cases finished; no probability is lost."
+
+
+def test_labels_avoid_each_other_where_points_are_close_and_stay_in_place_where_they_are_not():
+    from fatigue_runner.report.labels import PLACES, Label, draw_labels, overlap
+    from fatigue_runner.report.style import new_figure, styled
+
+    with styled():
+        axes = new_figure(3).subplots()
+        axes.set(xlim=(0, 1), ylim=(0, 1))
+        points = [(0.1, 0.1), (0.5, 0.5), (0.515, 0.5)]
+        draw_labels(axes, [Label(point, "rk4 20 ms", "black") for point in points])
+        figure = axes.get_figure()
+        figure.draw_without_rendering()
+        boxes = [text.get_window_extent().extents for text in axes.texts]
+    assert axes.texts[0].xyann == PLACES[0][:2]
+    assert not any(overlap(a, b) for i, a in enumerate(boxes) for b in boxes[:i])

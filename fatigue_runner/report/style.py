@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,7 +14,6 @@ from fatigue_runner.report.ranking import MethodSummary
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
-    from matplotlib.patheffects import AbstractPathEffect
 
 WIDTH = 8.0  # in; drawn at 180 mm on an A4 page, where 8 pt type becomes 7 pt
 
@@ -169,13 +169,8 @@ def _plain(value: float, _position: float = 0.0) -> str:
     return f"{value:g}"
 
 
-def halo() -> AbstractPathEffect:
-    """A white edge that keeps a label readable where a line runs below it."""
-    from matplotlib.patheffects import withStroke
-
-    return withStroke(linewidth=1.8, foreground="white")
-
-
 def percent(value: float, _position: float = 0.0) -> str:
     """A tick's relative value as a percentage."""
-    return f"{value * 100:g} %"
+    shown = value * 100
+    # Far below what matters the power says more than the zeros.
+    return f"{shown:g} %" if shown > 0.9e-3 else f"$10^{{{math.log10(shown):.0f}}}$ %"

@@ -63,9 +63,14 @@ def _cells(run: Run, s: MethodSummary) -> list[str]:
         format_error(s.nrmse_worst),
         "–" if s.median_del_error is None else format_percent(s.median_del_error),
         "–" if worst is None else format_percent(worst.value),
-        "–" if worst is None else worst.where(),
+        "–" if worst is None else _unbroken(worst.where()),
         _verdict(s),
     ]
+
+
+def _unbroken(place: str) -> str:
+    """Keep `m = 12` and `5 m/s` on one line each."""
+    return place.replace(" = ", "\u00a0=\u00a0").replace(" m/s", "\u00a0m/s")
 
 
 def _shown(value: float | None) -> str:

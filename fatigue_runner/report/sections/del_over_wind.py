@@ -116,7 +116,7 @@ def _draw_panel(
             below.plot(*zip(*scatter, strict=True), color=QUIET, linewidth=1.6, alpha=0.6)
     for summary in shown:
         _draw_integrator(_rows(run, summary), suffix, exponent, channel.scale, look[summary], above, below)
-    above.set_ylim(bottom=0)
+    above.set_ylim(0, 1.07 * max(above.dataLim.ymax, 1e-9))
     above.tick_params(labelbottom=False)
     above.grid(axis="y")
     if below.has_data():

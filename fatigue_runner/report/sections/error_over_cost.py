@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from fatigue_runner.report.blocks import Figure, Paragraph, Section
 from fatigue_runner.report.cells import format_step
+from fatigue_runner.report.labels import Label, draw_labels
 from fatigue_runner.report.ranking import LEVELS, MethodSummary, pareto
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.style import (
@@ -14,7 +15,6 @@ from fatigue_runner.report.style import (
     QUIET,
     Look,
     family,
-    halo,
     looks,
     new_figure,
     percent,
@@ -59,17 +59,29 @@ def _draw(run: Run, drawn: list[MethodSummary]) -> str:
         figure = new_figure(3.9)
         left, right = figure.subplots(1, 2, sharey=True)
         look = looks(run.summaries)
-        _draw_panel(left, drawn, look, lambda s: s.evaluations_per_second)
-        _draw_panel(right, drawn, look, lambda s: s.wall_time_per_second and s.wall_time_per_second * 1e6)
+        counted = _draw_panel(left, drawn, look, lambda s: s.evaluations_per_second)
+        timed = _draw_panel(right, drawn, look, _microseconds)
         left.set_xlabel("evaluations per simulated second")
         right.set_xlabel("measured time per simulated second [µs]")
         left.set_ylabel("worst DEL error")
         left.yaxis.set_major_formatter(percent)
+        draw_labels(left, counted)
+        draw_labels(right, timed)
         return to_svg(figure)
 
 
-def _draw_panel(axes: Axes, drawn: list[MethodSummary], look: dict[MethodSummary, Look], cost: Cost) -> None:
+def _microseconds(summary: MethodSummary) -> float | None:
+    return None if summary.wall_time_per_second is None else summary.wall_time_per_second * 1e6
+
+
+def _draw_panel(
+    axes: Axes, drawn: list[MethodSummary], look: dict[MethodSummary, Look], cost: Cost
+) -> list[Label]:
+    """Draw one panel; returns its labels, which need the finished layout."""
     points = {s: (x, s.worst_del_error.size) for s in drawn if (x := cost(s)) and s.worst_del_error}
+    if not points:
+        axes.set_visible(False)
+        return []
     front = pareto(points)
     axes.loglog(*zip(*points.values(), strict=True), linestyle="none")  # sets the limits
     axes.margins(x=0.1, y=0.1)
@@ -79,6 +91,7 @@ def _draw_panel(axes: Axes, drawn: list[MethodSummary], look: dict[MethodSummary
     for level in LEVELS:
         axes.axhline(level, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3)), zorder=0.5)
     _draw_front(axes, sorted(points[s] for s in front))
+    labels: list[Label] = []
     families: dict[tuple[str, str, str], list[MethodSummary]] = {}
     for summary in sorted(points, key=lambda s: points[s][0]):
         families.setdefault(family(summary), []).append(summary)
@@ -88,7 +101,8 @@ def _draw_panel(axes: Axes, drawn: list[MethodSummary], look: dict[MethodSummary
         )
         for summary in members:
             _draw_point(axes, summary, points[summary], look[summary], summary in front)
-            _label(axes, summary, points[summary], look[summary], named=summary is members[-1])
+            labels.append(_label(summary, points[summary], look[summary], named=summary is members[-1]))
+    return labels
 
 
 def _make_room_for_labels(axes: Axes) -> None:
@@ -110,19 +124,8 @@ def _draw_point(axes: Axes, s: MethodSummary, point: tuple[float, float], look: 
     axes.plot(x, y, markersize=5, **look.dots(filled=on_front))
 
 
-def _label(axes: Axes, s: MethodSummary, point: tuple[float, float], look: Look, named: bool) -> None:
+def _label(s: MethodSummary, point: tuple[float, float], look: Look, named: bool) -> Label:
     """The step beside its point; the last point of a line carries the method's name too."""
     step = "" if s.step is None else format_step(s.step)
     name = s.method + (f" + {s.corrector}" if s.corrector else "")
-    text = f"{name} {step}" if named else step
-    weight = "bold" if named else "normal"
-    axes.annotate(
-        text,
-        point,
-        xytext=(5, 3),
-        textcoords="offset points",
-        fontsize=6.5,
-        fontweight=weight,
-        color=look.colour,
-        path_effects=[halo()],
-    )
+    return Label(point, f"{name} {step}".strip() if named else step, look.colour, bold=named)

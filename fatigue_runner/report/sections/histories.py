@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,19 +62,15 @@ def _series(run: Run, wind: WindCase, summary: MethodSummary | None) -> tuple[np
 def _draw(run: Run, winds: list[WindCase], shown: list[MethodSummary]) -> str:
     with styled():
         figure = new_figure(4.3)
-        grid = figure.subplots(
-            2, len(winds), sharex=True, sharey="row", squeeze=False, height_ratios=(1.15, 1)
-        )
+        above, below = figure.subplots(2, len(winds), sharex=True, squeeze=False, height_ratios=(1.15, 1))
         look = looks(run.summaries)
-        references = [
-            _draw_wind(run, wind, shown, look, grid[0][column], grid[1][column])
-            for column, wind in enumerate(winds)
-        ]
-        grid[0][0].set_ylim(*_limits(references))
-        grid[0][0].set_ylabel("$x_\\mathrm{FA}$ [m]")
-        grid[1][0].set_ylabel("distance from reference [m]")
-        for axes in grid[1]:
-            axes.set_xlabel("time [s]")
+        for column, wind in enumerate(winds):
+            _draw_wind(run, wind, shown, look, above[column], below[column])
+            below[column].tick_params(labelleft=column == 0)
+            below[column].set_xlabel("time [s]")
+        _same_limits(below)
+        above[0].set_ylabel("$x_\\mathrm{FA}$ [m]")
+        below[0].set_ylabel("distance from reference [m]")
         draw_legend(figure, [*([run.reference] if run.reference else []), *shown], look)
         return to_svg(figure)
 
@@ -85,8 +82,7 @@ def _draw_wind(
     look: dict[MethodSummary, Look],
     above: Axes,
     below: Axes,
-) -> np.ndarray:
-    """Draw one column; returns the reference's values."""
+) -> None:
     reference = _series(run, wind, run.reference)
     assert reference is not None
     above.set_title(f"{wind.speed:.3g} m/s")
@@ -100,15 +96,25 @@ def _draw_wind(
         if row is not None and number(row, "diverged_at") is not None:
             above.plot(series[0][-1], series[1][-1], marker="x", color=look[summary].colour)
     above.plot(*reference, color=INK, linewidth=0.7)
+    above.set_ylim(*_limits(reference[1]))
     below.grid(axis="y")
-    return reference[1]
 
 
-def _limits(references: list[np.ndarray]) -> tuple[float, float]:
-    """Limits by the reference alone: a diverging curve may leave the axes, not flatten everything else."""
-    low, high = min(float(r.min()) for r in references), max(float(r.max()) for r in references)
-    margin = 0.08 * max(high - low, 1e-6)
-    return low - margin, high + margin
+def _same_limits(row: Sequence[Axes]) -> None:
+    limits = [axes.get_ylim() for axes in row if axes.has_data()]
+    for axes in row if limits else ():
+        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+
+
+def _limits(values: np.ndarray) -> tuple[float, float]:
+    """Limits by the reference alone, and not narrower than a steady value deserves.
+
+    A diverging curve may leave the axes, not flatten everything else; rounding must not fill them.
+    """
+    low, high = float(values.min()), float(values.max())
+    span = max(high - low, 0.05 * max(abs(low), abs(high)), 1e-6)
+    middle = 0.5 * (low + high)
+    return middle - 0.58 * span, middle + 0.58 * span
 
 
 def _envelope(
