@@ -114,7 +114,7 @@ def natural_frequencies(turbine: Turbine, wind: float, pitch: float) -> list[tup
         if value.imag > 2 * np.pi * 0.05:
             share = (np.abs(vector[8:]) * weight) ** 2
             share[6:8] = share[6:8].sum() / 2
-            modes.append((value.imag / (2 * np.pi), -value.real / abs(value), share))
+            modes.append((float(abs(value) / (2 * np.pi)), float(-value.real / abs(value)), share))
     modes.sort(key=lambda m: m[0])
     return [
         (name, f, damping) for name, (f, damping, _) in zip(_names([m[2] for m in modes]), modes, strict=True)

@@ -96,7 +96,7 @@ class Turbine:
         return operating_point(self, wind, vertical_shear, horizontal_shear, azimuth, pitch)
 
     def natural_frequencies(self, wind: float, pitch: float = 0.0) -> list[tuple[str, float, float]]:
-        """(name, damped frequency [Hz], damping ratio) of the oscillating modes at the operating point, rising."""
+        """(name, undamped natural frequency [Hz], damping ratio) of the oscillating modes, by frequency."""
         from fatigue_runner.turbine.steady import natural_frequencies
 
         return natural_frequencies(self, wind, pitch)
