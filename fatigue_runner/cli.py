@@ -18,8 +18,6 @@ from fatigue_runner.errors import FatigueRunnerError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fatigue_runner.campaign import Results
-
 # Command groups of other rooms, loaded when they are called: (module, its Typer app).
 MOUNTED = {"logs": ("fatigue_runner.logbook.commands", "app")}
 
@@ -65,9 +63,12 @@ def _options(
 
 @app.command()
 def run(
-    campaign: Annotated[Path, typer.Argument(help="The campaign's YAML file.", show_default=False)],
+    campaign: Annotated[
+        Path, typer.Argument(metavar="CAMPAIGN", help="The campaign's YAML file.", show_default=False)
+    ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Run folder; default runs/<name of the campaign>.")
+        Path | None,
+        typer.Option("--out", "-o", help="Run folder; default `runs/NAME` with the campaign's name."),
     ] = None,
     workers: Annotated[
         int | None,
@@ -90,13 +91,12 @@ def run(
 
         fatigue-runner run campaigns/quickstart.yaml
 
-        fatigue-runner run campaigns/paper_in_range.yaml --out runs/paper --workers 8
+        fatigue-runner run my.yaml --out runs/try --workers 8
     """
-    from rich.console import Console
-
     from fatigue_runner.campaign import CampaignInterrupted, run_campaign
+    from fatigue_runner.cli_tables import print_results
 
-    console = Console()
+    console = _console()
     try:
         results = run_campaign(campaign, out, workers=workers, fresh=fresh, dask=dask, console=console)
     except KeyboardInterrupt:
@@ -107,7 +107,9 @@ def run(
 
 @app.command()
 def report(
-    run_folder: Annotated[Path, typer.Argument(help="The folder that `run` wrote.", show_default=False)],
+    run_folder: Annotated[
+        Path, typer.Argument(metavar="RUN_FOLDER", help="The folder that `run` wrote.", show_default=False)
+    ],
 ) -> None:
     """Write `report.html` of a run folder again.
 
@@ -120,94 +122,36 @@ def report(
     typer.echo(f"report: {write_report(run_folder)}")
 
 
-def print_results(results: Results, console: Console) -> None:
-    """Which integrator is good enough and what it costs, the answer in words, and where everything lies."""
-    from rich.markup import escape
+@app.command()
+def turbine(
+    name: Annotated[
+        str, typer.Argument(metavar="[NAME]", help="A shipped turbine, or the path of a turbine YAML.")
+    ] = "nrel5mw",
+    wind: Annotated[
+        list[float] | None,
+        typer.Option("--wind", "-w", help="Wind speed [m/s]; may be repeated. Default 6, 8, 10."),
+    ] = None,
+    pitch: Annotated[float, typer.Option("--pitch", help="Blade pitch [deg], positive to feather.")] = 0.0,
+) -> None:
+    """Show a turbine: masses, power coefficient, operating points, natural frequencies, stability limits.
 
-    from fatigue_runner.report.ranking import answer, rank
+    Examples:
 
-    summaries = rank(results.rows)
-    console.print()
-    console.print(_table(results, summaries))
-    for sentence in answer(summaries):
-        console.print(escape(sentence))
-    for row in results.lost[:10]:
-        when = (
-            f"at {row['diverged_at']:.4g} s" if row["status"] == "diverged" else f": {row['error_message']}"
-        )
-        console.print(f"[red]{row['status']}[/] {escape(row['case_id'])} {escape(when)}", soft_wrap=True)
-    if len(results.lost) > 10:
-        console.print(f"... and {len(results.lost) - 10} more; see the column `status` of results.csv")
-    console.print(
-        f"{len(results)} cases, {results.simulated} of them simulated now, in {results.wall_time:.1f} s; "
-        f"report: {escape(str(results.out / 'report.html'))}",
-        soft_wrap=True,
-    )
+        fatigue-runner turbine
 
+        fatigue-runner turbine t2b1i1cg --wind 8 --wind 11
+    """
+    from fatigue_runner.cli_tables import print_turbine
 
-def _table(results: Results, summaries: Any) -> Any:
-    from rich.table import Table
-
-    from fatigue_runner.channels import BY_NAME
-    from fatigue_runner.report.cells import format_percent, numbers
-    from fatigue_runner.report.ranking import fatigue_columns, integrator_key
-
-    fatigue = fatigue_columns(results.rows)
-    channels = list(dict.fromkeys(channel for channel, _, _ in fatigue))
-    table = Table(
-        title="Integrators, cheapest first; DEL errors are the worst over winds and Wöhler exponents"
-    )
-    table.add_column("integrator", no_wrap=True)
-    for heading in ("f per s", "ms per s", "NRMSE median", "NRMSE worst"):
-        table.add_column(heading, justify="right")
-    for channel in channels:
-        table.add_column(f"DEL error {BY_NAME[channel].label.replace(' moment', '')}", justify="right")
-    table.add_column("verdict")
-    for summary in summaries:
-        rows = [row for row in results.rows if integrator_key(row) == summary.key and row["status"] == "done"]
-        errors = []
-        for wanted in channels:
-            found = [
-                abs(e)
-                for channel, _, suffix in fatigue
-                if channel == wanted
-                for e in numbers(rows, f"del_error_{suffix}")
-            ]
-            errors.append(format_percent(max(found)) if found else "")
-        wall_time = summary.wall_time_per_second
-        table.add_row(
-            summary.label,
-            _figure(summary.evaluations_per_second, "{:.0f}"),
-            _figure(None if wall_time is None else wall_time * 1e3, "{:.3g}"),
-            _figure(summary.nrmse_median, "{:.1e}"),
-            _figure(summary.nrmse_worst, "{:.1e}"),
-            *errors,
-            _verdict(summary),
-        )
-    table.caption = "f per s, ms per s: evaluations and wall time of the integration per simulated second"
-    return table
+    print_turbine(name, wind or [6.0, 8.0, 10.0], pitch, _console())
 
 
-def _figure(value: float | None, form: str) -> str:
-    return "" if value is None else form.format(value)
+def _console() -> Console:
+    from rich.console import Console
 
-
-def _verdict(summary: Any) -> str:
-    from fatigue_runner.report.cells import format_percent
-    from fatigue_runner.report.ranking import LEVELS
-
-    if not summary.complete:
-        return f"[red]{summary.cases - summary.done} of {summary.cases} lost[/]"
-    if summary.is_reference:
-        return "reference"
-    if summary.worst_del_error is None:
-        return "not compared"
-    met = [level for level in LEVELS if summary.worst_del_error.size <= level]
-    return (
-        f"[green]DEL error ≤ {format_percent(min(met))}[/]"
-        if met
-        else f"DEL error > {format_percent(max(LEVELS))}"
-    )
+    console = Console(highlight=False)
+    # A file or a pipe has no width; the default of 80 would fold the tables.
+    return console if console.is_terminal else Console(highlight=False, width=120)
 
 
 def main() -> None:

@@ -13,11 +13,11 @@ import numpy as np
 from fatigue_runner.campaign.cases import Case, Integration
 from fatigue_runner.campaign.evaluate import (
     DESCRIPTION,
-    STATISTICS,
     Evaluated,
     evaluate,
     failed_row,
     make_row,
+    scaled_error,
 )
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.errors import FatigueRunnerError
@@ -48,7 +48,7 @@ class Job:
     cases: list[Case]
     references: list[Case]
     initial: dict[str, np.ndarray]
-    logged: dict[str, dict[str, Any]]
+    logged: set[str]
 
 
 def run_block(job: Job) -> list[dict[str, Any]]:
@@ -121,22 +121,10 @@ def _read(job: Job, case: Case) -> Trajectory | None:
     """The trajectory in a case's log; None where it cannot be read, so that the case is simulated again."""
     from fatigue_runner.logbook import read_log
 
-    row = job.logged[case.id]["row"]
     try:
-        log = read_log(job.setup.logs / f"{case.id}.mcap")
+        return read_log(job.setup.logs / f"{case.id}.mcap")
     except (FatigueRunnerError, OSError):
         return None
-    return Trajectory(
-        log.time,
-        log.state,
-        log.wind,
-        log.loads,
-        log.accepted,
-        log.discrepancy,
-        log.threshold,
-        log.local_error,
-        **{name: row[name] for name in STATISTICS},
-    )
 
 
 def simulate(
@@ -190,7 +178,20 @@ def _finish(
         **{name: "" if row[name] is None else str(row[name]) for name in DESCRIPTION},
     }
     result = {name: str(value) for name, value in row.items() if value is not None}
-    write_log(path, trajectory, identity, job.setup.attachments, result, compression=campaign.log.compression)
+    error = None
+    if reference is not None and not case.integration.is_reference and trajectory.diverged_at is None:
+        error = scaled_error(trajectory, reference.whole)
+    write_log(
+        path,
+        trajectory,
+        identity,
+        job.setup.attachments,
+        result,
+        reference_error=error,
+        compression=campaign.log.compression,
+        topics=campaign.log.topics,
+        channels=campaign.log.channels,
+    )
     return _record(case, row, path.stat().st_size)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import itertools
 import json
@@ -16,9 +17,8 @@ from fatigue_runner.campaign.spec import Campaign, Wind
 from fatigue_runner.campaign.sweep import expand
 from fatigue_runner.errors import InputError
 
-# Raised when a change of the program changes results, so that an old run folder is not mixed with new
-# figures.
-RESULT_VERSION = 1
+# The code that decides the figures of a case.
+NUMERICAL_CODE = ("turbine", "wind", "integrators", "fatigue", "accuracy.py", "campaign/evaluate.py")
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def make_cases(campaign: Campaign, winds: Sequence[WindCase], turbine_hash: str)
         reference_hash = ""
         for integration in integrations(campaign):
             simulation = {
-                "version": RESULT_VERSION,
+                "code": code_hash(),
                 "turbine": turbine_hash,
                 # A file's content counts, not where it lies.
                 "wind": [wind.kind, [pair for pair in wind.parameters if pair[0] != "file"]],
@@ -195,6 +195,17 @@ def _refuse_same_names(cases: Iterable[Case]) -> None:
         if case.id in seen:
             raise InputError(f"two cases would have the same name {case.id!r}; rename one of the wind files")
         seen[case.id] = case
+
+
+@functools.cache
+def code_hash() -> str:
+    """Hash of the program's numerical code, so that figures of two versions never stand in one table."""
+    root, digest = Path(__file__).parents[1], hashlib.sha256()
+    for part in NUMERICAL_CODE:
+        path = root / part
+        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+            digest.update(f"{file.relative_to(root).as_posix()}\n".encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def blocks(items: Sequence[Any], keys: Sequence[float | None], size: int, workers: int) -> list[list[Any]]:

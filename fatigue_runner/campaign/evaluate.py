@@ -13,9 +13,6 @@ from fatigue_runner.campaign.results import columns, fatigue_keys, known
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.trajectory import Trajectory
 
-# What a log does not hold, so that a trajectory read back from it takes these from the record of its own run.
-STATISTICS = ("steps", "evaluations", "clamped_lookups", "wall_time", "diverged_at")
-
 # The columns that say what was simulated; a log carries them too.
 DESCRIPTION = (
     *("wind_source", "wind_speed", "vertical_shear", "horizontal_shear", "turbulence_intensity", "seed"),
@@ -25,8 +22,9 @@ DESCRIPTION = (
 
 @dataclass
 class Evaluated:
-    """A trajectory without its discarded start, and its DELs {(channel, exponent): value or None}."""
+    """A trajectory, the part that counts, and its DELs {(channel, exponent): value or None}."""
 
+    whole: Trajectory
     trajectory: Trajectory
     loads: dict[tuple[str, float], float | None]
 
@@ -51,7 +49,7 @@ def evaluate(trajectory: Trajectory, campaign: Campaign) -> Evaluated:
 
     kept = discarded(trajectory, campaign.discard)
     if trajectory.diverged_at is not None:
-        return Evaluated(kept, {})
+        return Evaluated(trajectory, kept, {})
     fatigue = campaign.fatigue
     loads: dict[tuple[str, float], float | None] = {}
     for channel in fatigue.channels:
@@ -59,7 +57,19 @@ def evaluate(trajectory: Trajectory, campaign: Campaign) -> Evaluated:
             kept.loads[channel], fatigue.wohler_exponents, kept.duration, fatigue.residue
         )
         loads |= {(channel, m): result.load(m) for m in fatigue.wohler_exponents}
-    return Evaluated(kept, loads)
+    return Evaluated(trajectory, kept, loads)
+
+
+def scaled_error(test: Trajectory, reference: Trajectory) -> np.ndarray:
+    """Error over time for the log, (n-1,): largest |x - x_ref| / range of the state, at the intervals' ends.
+
+    NaN where no state of the reference moves.
+    """
+    extent = np.ptp(reference.state, axis=0)
+    moving = extent > 0.0
+    if not moving.any():
+        return np.full(len(test.time) - 1, np.nan)
+    return np.max(np.abs(test.state - reference.state)[1:, moving] / extent[moving], axis=1)
 
 
 def make_row(

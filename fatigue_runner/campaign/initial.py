@@ -14,9 +14,9 @@ def initial_state(turbine: Any, initial: str | Any, wind: Any, pitch: float = 0.
     """State (16,) at t = 0 in the order of `channels.STATES` for a wind source; pitch [rad].
 
     `operating-point` is that of the wind's mean speed and shears. `paper` is the literal state of
-    arXiv:2504.05493: all zero but a rotor azimuth of pi/3, which leaves the generator 60 degrees behind and winds
-    the shaft up. `paper-spinning` is what was probably meant, since it fits the paper's figure: the rotor turns
-    at pi/3 rad/s, the generator with it. A sequence is the state itself.
+    arXiv:2504.05493: all zero but a rotor azimuth of pi/3, which leaves the generator 60 degrees behind
+    and winds the shaft up. `paper-spinning` is what was probably meant, since it fits the paper's
+    figure: the rotor turns at pi/3 rad/s, the generator with it. A sequence is the state itself.
     Raises InputError where the turbine has no operating point at this wind.
     """
     if not isinstance(initial, str):

@@ -12,7 +12,7 @@ import numpy as np
 
 from fatigue_runner.campaign import checks
 from fatigue_runner.campaign.block import Job, Setup
-from fatigue_runner.campaign.cases import RESULT_VERSION, Case, blocks, make_cases, wind_cases
+from fatigue_runner.campaign.cases import Case, blocks, code_hash, make_cases, wind_cases
 from fatigue_runner.campaign.source import Source, read_source
 from fatigue_runner.campaign.spec import Campaign, parse_campaign
 from fatigue_runner.campaign.store import Store
@@ -42,7 +42,12 @@ class Plan:
     def identity(self) -> dict[str, Any]:
         """What a run folder of this campaign must have in common with it."""
         common = self.campaign.model_dump(include={"name", "duration", "output_rate", "initial", "pitch"})
-        return {"version": RESULT_VERSION, "turbine_hash": self.turbine.hash, **common}
+        return {"code": code_hash(), "turbine_hash": self.turbine.hash, **common}
+
+    @property
+    def logs_are_whole(self) -> bool:
+        """Whether a log holds all that a trajectory needs to be evaluated again."""
+        return self.campaign.log.topics is None and self.campaign.log.channels is None
 
     def jobs(self, store: Store, setup: Setup, workers: int) -> list[Job]:
         """The blocks of all cases that are not finished in the store, with the references that they need."""
@@ -58,8 +63,7 @@ class Plan:
         for winds in blocks(list(pending), keys, BLOCK_SIZE, workers):
             needed = [references[wind] for wind in winds if wind in references]
             cases = [case for wind in winds for case in pending[wind]]
-            found = {case.id: store.logged(case) for case in [*needed, *cases]}
-            logged = {case_id: record for case_id, record in found.items() if record is not None}
+            logged = {case.id for case in [*needed, *cases] if self.logs_are_whole and store.logged(case)}
             initial = {wind: self.initial[wind] for wind in winds}
             jobs.append(Job(setup, cases, needed, initial, logged))
         return jobs

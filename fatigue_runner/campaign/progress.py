@@ -70,5 +70,5 @@ def _bar(console: Console) -> Any:
         progress.TextColumn("left"),
         progress.TimeRemainingColumn(),
         console=console,
-        transient=False,
+        transient=True,
     )

@@ -51,12 +51,13 @@ def run_campaign(
         folder = Path(out) if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh)
         simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress)
-        results = _collect(plan, store, simulated, time.perf_counter() - started)
+        results = _collect(plan, store, simulated)
         results.write()
         progress.say("writing the report")
         from fatigue_runner.report import write_report
 
         write_report(folder)
+    results.wall_time = time.perf_counter() - started
     return results
 
 
@@ -101,7 +102,7 @@ def _warm_up(plan: Plan, progress: Any) -> None:
     integrators.warm_up()
 
 
-def _collect(plan: Plan, store: Store, simulated: int, wall_time: float) -> Results:
+def _collect(plan: Plan, store: Store, simulated: int) -> Results:
     fatigue = plan.campaign.fatigue
     return Results(
         out=store.out,
@@ -109,7 +110,6 @@ def _collect(plan: Plan, store: Store, simulated: int, wall_time: float) -> Resu
         rows=[store.records[case.id]["row"] for case in plan.cases],
         simulated=simulated,
         kept=len(plan.cases) - simulated,
-        wall_time=wall_time,
     )
 
 

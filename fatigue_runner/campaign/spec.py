@@ -28,6 +28,8 @@ fatigue.residue           what the rainflow residue counts as: `half` (default, 
 
 log.enabled      one MCAP file per case in logs/ (default true)
 log.compression  `zstd` (default), `lz4` or `none`
+log.topics       which of `state`, `loads`, `status`, `wind` (default all; less cannot be read back)
+log.channels     names of states, wind signals and loads (default all)
 
 A sweep is a number, a list of numbers, {start, stop, step}, {start, stop, count} (both ends included),
 {random: {count, low, high, seed}}, or a list of such pieces.
@@ -51,7 +53,7 @@ from pydantic import (
 from fatigue_runner.campaign.section import Section, input_error, problem
 from fatigue_runner.campaign.source import Source
 from fatigue_runner.campaign.sweep import Piece, Sweep, as_list, check_not_empty, expand
-from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
+from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
 from fatigue_runner.errors import did_you_mean
 
 INITIAL_STATES = ("operating-point", "paper", "paper-spinning")
@@ -187,11 +189,24 @@ class Fatigue(Section):
         return list(dict.fromkeys(channels))
 
 
+Topic = Literal["state", "loads", "status", "wind"]
+
+
 class Log(Section):
     """One MCAP file per case."""
 
     enabled: bool = True
     compression: Literal["zstd", "lz4", "none"] = "zstd"
+    topics: Annotated[list[Topic], BeforeValidator(check_not_empty)] | None = None
+    channels: Annotated[list[str], BeforeValidator(check_not_empty)] | None = None
+
+    @field_validator("channels")
+    @classmethod
+    def _signals_exist(cls, channels: list[str] | None) -> list[str] | None:
+        for name in channels or ():
+            if name not in BY_NAME:
+                raise problem(f"{name!r} is no state, wind signal or load{did_you_mean(name, BY_NAME)}")
+        return channels
 
 
 class Campaign(Section):

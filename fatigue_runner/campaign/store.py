@@ -21,11 +21,8 @@ from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.files import write_atomically
 from fatigue_runner.errors import InputError
 
-# The last eight bytes of a complete MCAP file. Source: MCAP format specification, "Magic".
-MCAP_MAGIC = b"\x89MCAP0\r\n"
-
 # What all cases of a folder have in common. Where it differs, no finished case could be kept.
-_IDENTITY = ("version", "name", "turbine_hash", "duration", "output_rate", "initial", "pitch")
+_IDENTITY = ("name", "code", "turbine_hash", "duration", "output_rate", "initial", "pitch")
 
 
 class Store:
@@ -54,12 +51,12 @@ class Store:
             return None
         return record if not logged or self._log_complete(record) else None
 
-    def logged(self, case: Case) -> dict[str, Any] | None:
-        """The record of a case whose log holds exactly its trajectory; None where there is no such log."""
+    def logged(self, case: Case) -> bool:
+        """Whether a complete log holds exactly the trajectory of this case."""
         record = self.records.get(case.id)
         if record is None or record["simulation_hash"] != case.simulation_hash:
-            return None
-        return record if self._log_complete(record) else None
+            return False
+        return self._log_complete(record)
 
     def open(self, run: dict[str, Any], campaign_text: str) -> None:
         """Create the folder, lock it against a second run, say whose it is. Raises InputError if locked."""
@@ -73,6 +70,8 @@ class Store:
         _lock(self._journal, self.out)
         if self._fresh:
             self._clear()
+        elif not self._ends_with_a_line():
+            self._journal.write(b"\n")  # what a crash cut off must not spoil the next record
         write_atomically(self.out / "campaign.yaml", campaign_text.encode())
         write_atomically(self.out / "run.json", json.dumps(self.identity | run, indent=1).encode())
 
@@ -107,19 +106,8 @@ class Store:
         except (OSError, ValueError):
             raise InputError(f"{self.out}/run.json cannot be read; give --out a new folder") from None
         for key, mine in self.identity.items():
-            if theirs.get(key) == mine or (self._fresh and key != "name"):
-                continue
-            what = (
-                "another campaign" if key == "name" else f"this campaign with another {key.replace('_', ' ')}"
-            )
-            way_out = (
-                "choose another --out"
-                if key == "name"
-                else "choose another --out, or overwrite it with --fresh"
-            )
-            raise InputError(
-                f"{self.out} belongs to {what} ({theirs.get(key)!s:.40}, not {mine!s:.40}); {way_out}"
-            )
+            if theirs.get(key) != mine and (key == "name" or not self._fresh):
+                raise InputError(f"{self.out} {_difference(key, theirs.get(key), mine)}")
 
     def _read_records(self) -> dict[str, dict[str, Any]]:
         """The last record of every case; a line that a crash cut off is as if it were never written."""
@@ -136,16 +124,16 @@ class Store:
                 continue
         return records
 
+    def _ends_with_a_line(self) -> bool:
+        content = (self.out / "cases.jsonl").read_bytes()
+        return not content or content.endswith(b"\n")
+
     def _log_complete(self, record: dict[str, Any]) -> bool:
+        from fatigue_runner.logbook import is_complete
+
         path = self.log_path(record["row"]["case_id"])
-        try:
-            if not record["log_bytes"] or path.stat().st_size != record["log_bytes"]:
-                return False
-            with path.open("rb") as file:
-                file.seek(-len(MCAP_MAGIC), os.SEEK_END)
-                return file.read() == MCAP_MAGIC
-        except OSError:
-            return False
+        size = path.stat().st_size if path.is_file() else 0
+        return size > 0 and size == record["log_bytes"] and is_complete(path)
 
     def _clear(self) -> None:
         """Remove what earlier runs of this campaign left: `--fresh` asked for it."""
@@ -155,6 +143,18 @@ class Store:
         self._journal.truncate(0)
         for name in ("results.csv", "results.parquet", "report.html"):
             (self.out / name).unlink(missing_ok=True)
+
+
+def _difference(key: str, theirs: Any, mine: Any) -> str:
+    """What makes the folder another campaign's, and the way out."""
+    fresh = "choose another --out, or overwrite it with --fresh"
+    if key == "name":
+        return f"belongs to another campaign ({theirs!s:.40}, this one is {mine}); choose another --out"
+    if key == "code":
+        return f"was written by another version of the program; {fresh}"
+    if key == "turbine_hash":
+        return f"was run with another turbine, or other data of it; {fresh}"
+    return f"was run with another {key.replace('_', ' ')} ({theirs!s:.20}, now {mine!s:.20}); {fresh}"
 
 
 def _lock(file: IO[bytes], out: Path) -> None:

@@ -1,0 +1,409 @@
+"""A campaign runs every case once, keeps what is finished, and never mixes the figures of two campaigns."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from campaign_world import CAMPAIGN, build_world, write_campaign
+
+from fatigue_runner.campaign import CampaignInterrupted, run_campaign
+from fatigue_runner.campaign.results import columns
+from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES
+from fatigue_runner.errors import InputError
+from fatigue_runner.fatigue import damage_equivalent_load, short_term_cycles
+from fatigue_runner.logbook import read_log
+
+
+@pytest.fixture
+def world(monkeypatch):
+    monkeypatch.setattr("fatigue_runner.report.write_report", lambda folder: folder / "report.html")
+    return build_world(monkeypatch)
+
+
+@pytest.fixture
+def campaign(tmp_path):
+    return write_campaign(tmp_path)
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "out"
+
+
+def snapshot(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def test_every_wind_meets_every_integrator_and_the_reference_once(world, campaign, out):
+    results = run_campaign(campaign, out)
+    assert len(results) == 3 * 4
+    assert results.exit_code == 0
+    for method, count in (("rk7", 1), ("rk4", 1), ("heun", 2)):
+        assert sorted(world.simulated(method)) == sorted([6.0, 8.0, 10.0] * count)
+    assert results.column("case_id")[:4] == [
+        "v06.00_rk7_10ms",
+        "v06.00_heun_50ms",
+        "v06.00_heun_100ms",
+        "v06.00_rk4_100ms",
+    ]
+
+
+def test_del_error_and_damage_ratio_are_those_of_the_toy_integrators(world, campaign, out):
+    results = run_campaign(campaign, out)
+    row = results.where(method="heun", step=0.1, wind_speed=8.0)[0]
+    # The toy's amplitude is 1 + step**2; the DEL is linear in it and the damage its power (campaign_world).
+    suffix = "blade1_root_flapwise_moment_m10"
+    assert row[f"del_error_{suffix}"] == pytest.approx(0.01, rel=1e-9)
+    assert row[f"damage_ratio_{suffix}"] == pytest.approx(1.01**10, rel=1e-9)
+    assert row["nrmse_max"] == pytest.approx(0.01 * np.sqrt(0.5) / 2, rel=0.02)
+    assert row["evaluations_per_second"] == pytest.approx(20.0)
+
+
+def test_the_reference_has_loads_and_costs_but_no_errors(world, campaign, out):
+    (row, *_) = run_campaign(campaign, out).where(is_reference=True)
+    assert row["del_blade1_root_flapwise_moment_m3"] > 0
+    assert row["evaluations"] > 0
+    assert row["nrmse_max"] is None
+    assert row["del_error_blade1_root_flapwise_moment_m3"] is None
+
+
+def test_the_csv_has_the_columns_in_order_and_empty_cells_for_the_unknown(world, campaign, out):
+    results = run_campaign(campaign, out)
+    with (out / "results.csv").open(newline="") as file:
+        reader = csv.DictReader(file)
+        rows = list(reader)
+    assert reader.fieldnames == columns(FATIGUE_CHANNELS, [3, 4, 5, 10, 12])
+    assert reader.fieldnames[:3] == ["case_id", "wind_source", "wind_speed"]
+    assert reader.fieldnames[-3:] == [f"{name}_{LOAD_NAMES[-1]}" for name in ("mean", "min", "max")]
+    assert rows[0]["nrmse_max"] == rows[0]["corrector"] == rows[0]["delta_t"] == ""
+    assert "nan" not in (out / "results.csv").read_text()
+    assert float(rows[1]["nrmse_max"]) == results.rows[1]["nrmse_max"]
+
+
+def test_the_parquet_table_equals_the_rows(world, campaign, out):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    results = run_campaign(campaign, out)
+    assert parquet.read_table(out / "results.parquet").to_pylist() == results.rows
+
+
+def test_every_case_has_a_log_that_says_what_it_is_and_how_far_from_the_reference(world, campaign, out):
+    results = run_campaign(campaign, out)
+    assert {p.stem for p in (out / "logs").iterdir()} == set(results.column("case_id"))
+    log = read_log(out / "logs" / "v08.00_heun_100ms.mcap")
+    assert log.run["method"] == "heun" and log.run["step"] == "0.1" and log.run["wind_speed"] == "8.0"
+    assert log.run["turbine_hash"] == "0" * 64
+    assert log.result["status"] == "done"
+    assert b"name: toy" in log.attachments["campaign.yaml"]
+    assert len(log.time) == 501
+    assert log.reference_error.max() == pytest.approx(0.01 / 2, rel=0.01)
+
+
+def test_the_run_folder_says_whose_it_is_and_can_be_run_again_from_its_own_campaign_file(
+    world, campaign, out
+):
+    first = run_campaign(campaign, out)
+    run = json.loads((out / "run.json").read_text())
+    assert run["name"] == "toy"
+    assert run["facts"]["turbine"] == "toy"
+    calls = len(world.calls)
+    again = run_campaign(out / "campaign.yaml", out)
+    assert (again.kept, again.simulated) == (12, 0)
+    assert len(world.calls) == calls
+    assert again.rows == first.rows
+
+
+def test_finished_cases_are_not_run_again(world, campaign, out):
+    first = run_campaign(campaign, out)
+    calls = len(world.calls)
+    second = run_campaign(campaign, out)
+    assert len(world.calls) == calls
+    assert (first.simulated, first.kept) == (12, 0)
+    assert (second.simulated, second.kept) == (0, 12)
+    assert second.rows == first.rows
+
+
+def test_only_the_missing_integrator_runs_and_the_reference_is_read_from_its_log(world, tmp_path, out):
+    fresh = run_campaign(write_campaign(tmp_path), tmp_path / "whole").where(method="rk4")
+    run_campaign(write_campaign(tmp_path, CAMPAIGN.replace("  - {method: rk4, step: 0.1}\n", "")), out)
+    world.calls.clear()
+    results = run_campaign(write_campaign(tmp_path), out)
+    assert [method for method, _, _ in world.calls] == ["rk4"]
+    assert results.simulated == 3
+    assert results.where(method="rk4") == fresh  # bit for bit, although the reference came from the log
+
+
+def test_a_case_whose_log_was_lost_or_cut_runs_again(world, campaign, out):
+    run_campaign(campaign, out)
+    (out / "logs" / "v06.00_heun_50ms.mcap").unlink()
+    cut = out / "logs" / "v08.00_heun_50ms.mcap"
+    cut.write_bytes(cut.read_bytes()[:-100])
+    world.calls.clear()
+    assert run_campaign(campaign, out).simulated == 2
+    assert sorted(world.simulated("heun")) == [6.0, 8.0]
+
+
+def test_other_wohler_exponents_are_evaluated_from_the_logs(world, tmp_path, out):
+    run_campaign(write_campaign(tmp_path), out)
+    world.calls.clear()
+    results = run_campaign(write_campaign(tmp_path, fatigue="{wohler_exponents: [8]}"), out)
+    assert world.calls == []
+    assert results.where(method="heun", step=0.1)[0][
+        "del_error_blade1_root_flapwise_moment_m8"
+    ] == pytest.approx(0.01)
+
+
+def test_a_crash_in_the_journal_costs_the_last_line_only(world, campaign, out):
+    run_campaign(campaign, out)
+    journal = out / "cases.jsonl"
+    journal.write_bytes(journal.read_bytes()[:-20])
+    world.calls.clear()
+    results = run_campaign(campaign, out)
+    assert results.simulated == 1
+    assert run_campaign(campaign, out).simulated == 0
+    assert results.exit_code == 0
+
+
+def test_fresh_runs_everything_again(world, campaign, out):
+    run_campaign(campaign, out)
+    world.calls.clear()
+    assert run_campaign(campaign, out, fresh=True).simulated == 12
+
+
+def test_an_interruption_keeps_the_finished_blocks_and_the_next_run_does_the_rest(
+    world, tmp_path, out, monkeypatch
+):
+    campaign = write_campaign(tmp_path, CAMPAIGN.replace("[6, 8, 10]", "{start: 5, stop: 9.9, step: 0.1}"))
+    advance, seen = "fatigue_runner.campaign.progress.Progress.advance", []
+
+    def stop_after_two(self, records):
+        seen.append(len(records))
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(advance, stop_after_two)
+    with pytest.raises(
+        CampaignInterrupted, match=r"of 200 cases are finished; the same command runs the rest"
+    ) as error:
+        run_campaign(campaign, out)
+    assert error.value.exit_code == 130
+    assert not (out / "results.csv").exists()
+    monkeypatch.undo()
+    build_world(monkeypatch)
+    monkeypatch.setattr("fatigue_runner.report.write_report", lambda folder: None)
+    results = run_campaign(campaign, out)
+    assert results.kept == sum(seen) > 0
+    assert results.simulated == 200 - sum(seen) > 0
+
+
+def test_a_diverged_case_is_reported_with_its_time_and_the_rest_finishes(world, campaign, out):
+    world.diverging["heun", 8.0] = 4.0
+    results = run_campaign(campaign, out)
+    assert results.exit_code == 1
+    lost = results.lost
+    assert [row["case_id"] for row in lost] == ["v08.00_heun_50ms", "v08.00_heun_100ms"]
+    assert lost[0]["status"] == "diverged" and lost[0]["diverged_at"] == 4.0
+    assert all(
+        lost[0][name] is None for name in lost[0] if name.startswith(("del_", "damage_", "nrmse", "mean_"))
+    )
+    assert read_log(out / "logs" / "v08.00_heun_50ms.mcap").time[-1] == 4.0
+    assert sum(row["status"] == "done" for row in results) == 10
+    assert run_campaign(campaign, out).simulated == 0  # it would diverge again
+
+
+def test_nothing_is_compared_with_a_reference_that_diverged(world, campaign, out):
+    world.diverging["rk7", 8.0] = 4.0
+    results = run_campaign(campaign, out)
+    row = results.where(method="rk4", wind_speed=8.0)[0]
+    assert row["status"] == "done" and row["del_blade1_root_flapwise_moment_m3"] > 0
+    assert row["nrmse_max"] is None and row["del_error_blade1_root_flapwise_moment_m3"] is None
+
+
+def test_an_integrator_that_raises_fails_alone_and_is_tried_again(world, campaign, out):
+    world.raising["rk4"] = RuntimeError("no luck")
+    results = run_campaign(campaign, out)
+    assert {row["method"] for row in results.lost} == {"rk4"}
+    assert {row["error_message"] for row in results.lost} == {"no luck"}
+    world.raising.clear()
+    again = run_campaign(campaign, out)
+    assert (again.simulated, again.exit_code) == (3, 0)
+
+
+def test_a_log_that_cannot_be_written_fails_its_case_only(world, campaign, out, monkeypatch):
+    import fatigue_runner.logbook as logbook
+
+    write = logbook.write_log
+
+    def full_disk(path, *args, **kwargs):
+        if path.stem == "v08.00_rk4_100ms":
+            raise logbook.LogError("the disk is full; free space or choose another folder")
+        return write(path, *args, **kwargs)
+
+    monkeypatch.setattr(logbook, "write_log", full_disk)
+    results = run_campaign(campaign, out)
+    assert [row["case_id"] for row in results.lost] == ["v08.00_rk4_100ms"]
+    assert "the disk is full" in results.lost[0]["error_message"]
+
+
+def test_without_logs_a_campaign_still_resumes(world, tmp_path, out):
+    campaign = write_campaign(tmp_path, log="{enabled: false}")
+    run_campaign(campaign, out)
+    assert list((out / "logs").iterdir()) == []
+    assert run_campaign(campaign, out).simulated == 0
+
+
+def test_without_a_reference_there_are_loads_and_no_errors(world, tmp_path, out):
+    text = CAMPAIGN.replace("{method: rk7, step: 0.01}", "null")
+    results = run_campaign(write_campaign(tmp_path, text), out)
+    assert len(results) == 9
+    assert all(row["nrmse_max"] is None and row["del_blade1_root_flapwise_moment_m3"] > 0 for row in results)
+
+
+def test_discarded_seconds_count_nowhere(world, tmp_path, out):
+    row = run_campaign(write_campaign(tmp_path, discard="4"), out).rows[0]
+    log = read_log(out / "logs" / f"{row['case_id']}.mcap")
+    load = log.loads["blade1_root_flapwise_moment"][log.time >= 4]
+    expected = damage_equivalent_load(load, 4, short_term_cycles(6.0))
+    assert row["del_blade1_root_flapwise_moment_m4"] == expected
+    assert row["mean_blade1_root_flapwise_moment"] == np.mean(load)
+    assert row["duration"] == log.duration == 10.0  # the log and the costs are of the whole case
+
+
+FOREIGN = {
+    "another campaign": (
+        "name",
+        "other",
+        "belongs to another campaign (toy, this one is other); choose another --out",
+    ),
+    "another duration": (
+        "duration",
+        "12",
+        "was run with another duration (10.0, now 12.0); choose another --out, or",
+    ),
+    "another start": ("initial", "paper", "was run with another initial (operating-point, now paper)"),
+}
+
+
+@pytest.mark.parametrize(("key", "value", "message"), FOREIGN.values(), ids=FOREIGN.keys())
+def test_the_folder_of_another_campaign_is_refused_and_left_as_it_was(
+    world, tmp_path, out, key, value, message
+):
+    run_campaign(write_campaign(tmp_path), out)
+    before = snapshot(out)
+    with pytest.raises(InputError) as error:
+        run_campaign(write_campaign(tmp_path, **{key: value}), out)
+    assert message in str(error.value)
+    assert snapshot(out) == before
+
+
+def test_fresh_does_not_overwrite_the_folder_of_another_campaign(world, tmp_path, out):
+    run_campaign(write_campaign(tmp_path), out)
+    with pytest.raises(InputError, match="another campaign"):
+        run_campaign(write_campaign(tmp_path, name="other"), out, fresh=True)
+
+
+def test_a_folder_with_other_files_is_refused_and_left_as_it_was(world, campaign, out):
+    out.mkdir()
+    (out / "thesis.txt").write_text("years of work")
+    with pytest.raises(InputError, match="holds files but no run; give --out a new or empty folder"):
+        run_campaign(campaign, out)
+    assert snapshot(out) == {"thesis.txt": b"years of work"}
+
+
+def test_a_file_is_no_run_folder(world, campaign, out):
+    out.write_text("")
+    with pytest.raises(InputError, match="is a file; give --out a folder"):
+        run_campaign(campaign, out)
+
+
+def test_a_second_run_into_the_same_folder_is_refused_while_the_first_one_writes(
+    world, campaign, out, monkeypatch
+):
+    pytest.importorskip("fcntl", reason="locks are those of Unix")
+    told = []
+
+    def run_again(self, records):
+        with pytest.raises(InputError, match="another run is writing here") as error:
+            run_campaign(campaign, out)
+        told.append(error)
+
+    monkeypatch.setattr("fatigue_runner.campaign.progress.Progress.advance", run_again)
+    assert run_campaign(campaign, out).exit_code == 0
+    assert told
+
+
+REFUSED = {
+    "unknown integrator": (
+        "rk4, step: 0.1",
+        "rk44, step: 0.1",
+        "toy.yaml:9: unknown integrator 'rk44'; did you mean 'rk4'?",
+    ),
+    "unstable step": (
+        "[0.05, 0.1]",
+        "[0.05, 0.3]",
+        "toy.yaml:8: heun at 300 ms is unstable on toy: its stability limit is",
+    ),
+    "wind outside the table": (
+        "[6, 8, 10]",
+        "[6, 80]",
+        "toy.yaml:6: wind speed 80 m/s is outside the aerodynamic tables",
+    ),
+    "no wind": ("[6, 8, 10]", "[6, 0]", "toy.yaml:6: wind speed 0 m/s is outside the aerodynamic tables"),
+    "missing wind file": (
+        "speeds: [6, 8, 10]",
+        "type: file\n  files: gone.csv",
+        "toy.yaml:7: wind file 'gone.csv' cannot be read (No such file or directory); paths start at the campaign file",
+    ),
+}
+
+
+@pytest.mark.parametrize(("line", "instead", "message"), REFUSED.values(), ids=REFUSED.keys())
+def test_what_the_turbine_cannot_do_is_refused_and_nothing_is_written(
+    world, tmp_path, out, line, instead, message
+):
+    with pytest.raises(InputError) as error:
+        run_campaign(write_campaign(tmp_path, CAMPAIGN.replace(line, instead)), out)
+    assert message in str(error.value)
+    assert not out.exists()
+    assert world.calls == []
+
+
+def test_winds_from_files_run_and_are_named_after_them(world, tmp_path, out):
+    times = np.arange(0, 12.5, 0.5)
+    for name, mean in (("gust", 8.0), ("calm", 6.0)):
+        rows = [f"{t},{mean + np.sin(t)},0.1,0" for t in times]
+        (tmp_path / f"{name}.csv").write_text(
+            "\n".join(["time,wind_speed,vertical_shear,horizontal_shear", *rows])
+        )
+    text = CAMPAIGN.replace("speeds: [6, 8, 10]", "type: file\n  files: [gust.csv, calm.csv]")
+    results = run_campaign(write_campaign(tmp_path, text), out)
+    assert results.rows[0]["case_id"] == "gust_rk7_10ms"
+    assert results.rows[0]["wind_source"] == "file"
+    assert results.exit_code == 0
+
+
+def test_a_wind_file_shorter_than_the_campaign_is_refused(world, tmp_path, out):
+    rows = [f"{t},8,0,0" for t in (0, 1, 2, 3)]
+    (tmp_path / "short.csv").write_text("\n".join(["time,wind_speed,vertical_shear,horizontal_shear", *rows]))
+    text = CAMPAIGN.replace("speeds: [6, 8, 10]", "type: file\n  files: short.csv")
+    with pytest.raises(InputError, match=r"toy\.yaml:7: the wind .* is 3 s long, the campaign runs 10 s"):
+        run_campaign(write_campaign(tmp_path, text), out)
+
+
+def test_seeds_and_shears_are_in_the_case_names_and_the_table(world, tmp_path, out):
+    text = CAMPAIGN.replace("[6, 8, 10]", "12\n  type: turbulent\n  turbulence_class: B\n  seeds: [1, 2]")
+    results = run_campaign(write_campaign(tmp_path, text), out)
+    assert results.rows[0]["case_id"] == "v12.00_ntmB_s1_rk7_10ms"
+    assert results.column("seed")[::4] == [1, 2]
+    # NTM class B at 12 m/s: 0.14 (0.75 * 12 + 5.6) / 12 (IEC 61400-1, ed. 3, eq. 11)
+    assert results.rows[0]["turbulence_intensity"] == pytest.approx(0.14 * (0.75 * 12 + 5.6) / 12)
+
+
+def test_a_shear_exponent_becomes_the_linear_shear_of_this_rotor(world, tmp_path, out):
+    text = CAMPAIGN.replace("[6, 8, 10]", "8\n  shear_exponent: 0.2")
+    row = run_campaign(write_campaign(tmp_path, text), out).rows[0]
+    assert row["vertical_shear"] == pytest.approx(0.2 * 63 / 90)
+    assert row["case_id"] == "v08.00_kv0.14_rk7_10ms"
