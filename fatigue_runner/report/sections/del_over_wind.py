@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from fatigue_runner.channels import BY_NAME, Channel
 from fatigue_runner.report.blocks import Figure, Paragraph, Section
-from fatigue_runner.report.cells import Row, number, text
+from fatigue_runner.report.cells import Row, number, numbers, text
 from fatigue_runner.report.ranking import MethodSummary
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.selection import left_out, shown_integrators
@@ -65,6 +65,8 @@ def customary_exponent(channel: str, exponents: Iterable[float]) -> float:
 def _panels(run: Run) -> list[tuple[str, float, str]]:
     by_channel: dict[str, dict[float, str]] = {}
     for channel, exponent, suffix in run.columns:
+        if not numbers(run.rows, f"del_{suffix}"):
+            continue
         by_channel.setdefault(channel, {})[exponent] = suffix
     chosen = {channel: customary_exponent(channel, found) for channel, found in by_channel.items()}
     return [(channel, chosen[channel], found[chosen[channel]]) for channel, found in by_channel.items()]
@@ -116,7 +118,8 @@ def _draw_panel(
             below.plot(*zip(*scatter, strict=True), color=QUIET, linewidth=1.6, alpha=0.6)
     for summary in shown:
         _draw_integrator(_rows(run, summary), suffix, exponent, channel.scale, look[summary], above, below)
-    above.set_ylim(0, 1.07 * max(above.dataLim.ymax, 1e-9))
+    highest = above.dataLim.ymax  # infinite where nothing is drawn
+    above.set_ylim(0, 1.07 * highest if 0 < highest < math.inf else 1)
     above.tick_params(labelbottom=False)
     above.grid(axis="y")
     if below.has_data():
