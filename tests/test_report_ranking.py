@@ -134,3 +134,16 @@ def test_an_empty_or_undefined_cell_is_unknown_and_not_zero():
     assert [number({"a": v}, "a") for v in ("", None, "nan", float("inf"), "text", True)] == [None] * 6
     assert number({"a": "1e7"}, "a") == 1e7 and number({}, "a") is None
     assert [truth({"a": v}, "a") for v in (True, "True", "1", False, "", None)] == [True] * 3 + [False] * 3
+
+
+def test_one_sentence_serves_several_levels_that_one_integrator_wins():
+    sentences = ranking.answer(ranking.rank([row("rk4", 0.02, 200, 0.0005), row("rk4", 0.01, 400, 1e-6)]))
+    assert len(sentences) == 1
+    assert sentences[0].startswith("Cheapest within 1 % and within 0.1 % DEL error: rk4 20 ms")
+
+
+def test_that_nothing_is_good_enough_is_said_once_at_the_easiest_level():
+    sentences = ranking.answer(ranking.rank([row("heun", 0.02, 100, 0.3), row("heun", 0.01, 200, 0.05)]))
+    assert sentences == [
+        "No integrator is within 1 % DEL error; the nearest is heun 10 ms with 5 % (blade 1 root flapwise, m = 4, 8 m/s)."
+    ]

@@ -218,19 +218,28 @@ def answer(summaries: Sequence[MethodSummary], levels: Sequence[float] = LEVELS)
             else "none finished all its cases beside the reference"
         )
         return [f"No integrator can be judged: {why}.", *_casualties(summaries)]
-    return [*(_level_sentence(tested, reference, level) for level in levels), *_casualties(summaries)]
+    winners: dict[MethodSummary | None, list[float]] = {}
+    for level in levels:
+        winners.setdefault(cheapest_within(tested, level), []).append(level)
+    sentences = [
+        _nearest_sentence(tested, passed[0]) if best is None else _best_sentence(best, passed, reference)
+        for best, passed in winners.items()
+    ]
+    return [*sentences, *_casualties(summaries)]
 
 
-def _level_sentence(tested: list[MethodSummary], reference: MethodSummary | None, level: float) -> str:
-    best = cheapest_within(tested, level)
-    if best is None:
-        nearest = min((s for s in tested if _competes(s)), key=_error_size)
-        return (
-            f"No integrator is within {format_percent(level)} DEL error; the nearest is {nearest.label} "
-            f"with {_worst(nearest)}."
-        )
+def _nearest_sentence(tested: list[MethodSummary], level: float) -> str:
+    nearest = min((s for s in tested if _competes(s)), key=_error_size)
     return (
-        f"Cheapest within {format_percent(level)} DEL error: {best.label}, "
+        f"No integrator is within {format_percent(level)} DEL error; the nearest is {nearest.label} "
+        f"with {_worst(nearest)}."
+    )
+
+
+def _best_sentence(best: MethodSummary, levels: list[float], reference: MethodSummary | None) -> str:
+    within = " and within ".join(format_percent(level) for level in levels)
+    return (
+        f"Cheapest within {within} DEL error: {best.label}, "
         f"{_count(best.evaluations_per_second)} evaluations per simulated second{_saving(best, reference)}; "
         f"its worst is {_worst(best)}."
     )
