@@ -27,8 +27,12 @@ def shown_integrators(run: Run, limit: int = 5) -> list[MethodSummary]:
 
 
 def shown_winds(run: Run, count: int = 3) -> list[WindCase]:
-    """The slowest, middle and fastest wind of the campaign (fewer where it has fewer)."""
-    winds = [wind for wind in run.winds if wind.speed is not None]
+    """The slowest, middle and fastest wind of the campaign (fewer where it has fewer), each at its first seed."""
+    first: dict[float, WindCase] = {}
+    for wind in run.winds:
+        if wind.speed is not None:
+            first.setdefault(wind.speed, wind)
+    winds = list(first.values())
     if len(winds) <= count:
         return winds
     return [winds[round(i * (len(winds) - 1) / (count - 1))] for i in range(count)]

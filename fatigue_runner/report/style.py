@@ -147,7 +147,10 @@ def draw_legend(
         )
         for s in shown
     ]
-    figure.legend(handles=entries, loc="outside upper center", ncols=min(6, len(entries)), handlelength=2.6)
+    # An entry takes its line (about 40 pt) and its glyphs; one row too wide would leave the page.
+    widest = 40.0 + 4.6 * max(len(str(entry.get_label())) for entry in entries)
+    ncols = min(len(entries), max(1, int(72.0 * figure.get_figwidth() / widest)))
+    figure.legend(handles=entries, loc="outside upper center", ncols=ncols, handlelength=2.6)
 
 
 def _dot(look: Look, summary: MethodSummary, dots: bool) -> dict[str, Any]:

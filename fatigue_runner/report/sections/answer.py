@@ -28,7 +28,7 @@ def build(run: Run) -> Section:
     sentences = answer(run.summaries)
     winners = [cheapest_within(run.integrators, level) for level in LEVELS]
     rows = [TableRow(_cells(run, s), _mark(s, winners)) for s in run.summaries]
-    lead = [Paragraph(sentence, strong=i == 0) for i, sentence in enumerate(sentences)]
+    lead = [Paragraph(_unbroken(sentence), strong=i == 0) for i, sentence in enumerate(sentences)]
     return Section(
         "Which integrator is good enough, and what does it cost?", [*lead, Table(COLUMNS, rows, CAPTION)]
     )

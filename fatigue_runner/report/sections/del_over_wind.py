@@ -102,22 +102,10 @@ def _draw_panel(
     above.set_title(f"{channel.label}, m = {exponent:g}", fontweight="normal")
     above.set_ylabel(f"DEL [{channel.read_unit}]")
     below.set_ylabel("error")
-    if run.reference is not None:
-        speeds, dels = _power_means(_rows(run, run.reference), f"del_{suffix}", exponent, channel.scale)
-        above.plot(
-            speeds,
-            dels,
-            color=INK,
-            linewidth=0.9,
-            linestyle="-" if len(speeds) <= CROWDED else "none",
-            marker=".",
-            markersize=2,
-        )
-        scatter = _seed_scatter(_rows(run, run.reference), f"del_{suffix}")
-        if scatter:
-            below.plot(*zip(*scatter, strict=True), color=QUIET, linewidth=1.6, alpha=0.6)
     for summary in shown:
         _draw_integrator(_rows(run, summary), suffix, exponent, channel.scale, look[summary], above, below)
+    if run.reference is not None:
+        _draw_reference(_rows(run, run.reference), suffix, exponent, channel.scale, above, below)
     highest = above.dataLim.ymax  # infinite where nothing is drawn
     above.set_ylim(0, 1.07 * highest if 0 < highest < math.inf else 1)
     above.tick_params(labelbottom=False)
@@ -127,6 +115,28 @@ def _draw_panel(
         below.yaxis.set_major_formatter(percent)
     below.axhline(0.01, color=FAINT, linewidth=1.2, zorder=0)
     below.grid(axis="y")
+
+
+def _draw_reference(
+    rows: list[Row], suffix: str, exponent: float, scale: float, above: Axes, below: Axes
+) -> None:
+    speeds, dels = _power_means(rows, f"del_{suffix}", exponent, scale)
+    line = "-" if len(speeds) <= CROWDED else "none"
+    # Over the points of the integrators where they crowd, under them where both can be seen.
+    order = 1 if len(speeds) <= CROWDED else 3
+    above.plot(speeds, dels, color=INK, linewidth=0.9, linestyle=line, marker=".", markersize=2, zorder=order)
+    scatter = _seed_scatter(rows, f"del_{suffix}")
+    if scatter:
+        below.plot(*zip(*scatter, strict=True), color=QUIET, linewidth=1.6, alpha=0.6)
+        below.annotate(
+            "scatter between seeds",
+            scatter[0],
+            xytext=(2, -3),
+            textcoords="offset points",
+            fontsize=6.5,
+            color=QUIET,
+            va="top",
+        )
 
 
 def _draw_integrator(

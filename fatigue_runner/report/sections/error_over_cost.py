@@ -85,7 +85,8 @@ def _draw_panel(
     front = pareto(points)
     axes.loglog(*zip(*points.values(), strict=True), linestyle="none")  # sets the limits
     axes.margins(x=0.1, y=0.1)
-    _make_room_for_labels(axes)
+    low, high = axes.get_xlim()
+    axes.set_xlim(low, high * (high / low) ** (0.012 * max(len(s.label) for s in points)))  # room for labels
     axes.grid(which="major")
     plain_logarithm(axes.xaxis)
     for level in LEVELS:
@@ -103,11 +104,6 @@ def _draw_panel(
             _draw_point(axes, summary, points[summary], look[summary], summary in front)
             labels.append(_label(summary, points[summary], look[summary], named=summary is members[-1]))
     return labels
-
-
-def _make_room_for_labels(axes: Axes) -> None:
-    low, high = axes.get_xlim()
-    axes.set_xlim(low, high * (high / low) ** 0.12)
 
 
 def _draw_front(axes: Axes, front: list[tuple[float, float]]) -> None:

@@ -85,7 +85,8 @@ def _draw_wind(
 ) -> None:
     reference = _series(run, wind, run.reference)
     assert reference is not None
-    above.set_title(f"{wind.speed:.3g} m/s")
+    seed = text(wind.rows[0], "seed")
+    above.set_title(f"{wind.speed:.3g} m/s" + (f", seed {seed}" if seed else ""))
     for summary in shown:
         series = _series(run, wind, summary)
         if series is None:
