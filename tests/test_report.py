@@ -15,7 +15,7 @@ from fatigue_runner.report import rundata, sections, write_report
 from fatigue_runner.report.blocks import Column, Figure, Paragraph, Table, TableRow
 from fatigue_runner.report.rundata import load_run
 from fatigue_runner.report.sections import del_over_wind, limits
-from fatigue_runner.report.selection import shown_integrators, shown_winds
+from fatigue_runner.report.selection import left_out, shown_integrators, shown_winds
 from fatigue_runner.report.style import COLOURS, looks
 
 
@@ -232,13 +232,10 @@ def test_without_a_reference_the_report_says_so_and_draws_no_error(tmp_path):
     assert "Reference None was run." in section_text("definitions", folder)
 
 
-def test_a_single_case_and_a_case_per_seed_both_make_a_report(tmp_path, logs):
-    one = [case_row(8, "rk7", 0.001, reference=True), case_row(8, "rk4", 0.02)]
-    many = example_rows(speeds=(8, 10), seeds=(1, 2, 3, 4), steps=(0.02,), diverging=False)
-    for name, rows in (("one", one), ("many", many)):
-        logs(rows)
-        html = write_report(write_run(tmp_path / name, rows)).read_text(encoding="utf-8")
-        assert len(Page(html).addresses) == 3
+def test_seeds_of_one_wind_make_a_report_with_their_scatter(tmp_path):
+    rows = example_rows(speeds=(8, 10), seeds=(1, 2, 3, 4), steps=(0.02,), diverging=False)
+    html = write_report(write_run(tmp_path / "run", rows)).read_text(encoding="utf-8")
+    assert len(Page(html).addresses) == 2 and "between seeds" in html
 
 
 def test_the_same_run_gives_the_same_bytes(folder, rows, logs):
@@ -323,8 +320,8 @@ def test_a_crowded_figure_keeps_the_recommended_integrators_and_says_what_it_lea
     run = load_run(folder)
     shown = [s.label for s in shown_integrators(run)]
     assert len(shown) == 5 and {"rk3 20 ms", "rk3 10 ms"} <= set(shown)
-    captions = [b.caption for b in build("del_over_wind", run).blocks if isinstance(b, Figure)]
-    assert "4 of the 9 integrators are left out here" in captions[0]
+    assert left_out(run, shown_integrators(run)).startswith(" 4 of the 9 integrators are left out here")
+    assert left_out(run, run.integrators) == ""
 
 
 def test_methods_differ_in_colour_and_steps_in_line(folder):
