@@ -49,7 +49,7 @@ def _status(
                 f"{name} to log has shape {column.shape}; it must be ({intervals},), one entry per interval"
             )
         # Row 0 ends no interval; its place is not written.
-        found[name] = np.concatenate([column[:1] * 0 if rows else column, column])[-rows:]
+        found[name] = np.concatenate([np.zeros(rows - intervals, column.dtype), column])
     return found
 
 

@@ -48,6 +48,12 @@ class Contents:
     messages: list[Record] = field(default_factory=list)
     damages: list[Damage] = field(default_factory=list)
     ended: bool = False
+    verified: bool = False
+
+    @property
+    def signed(self) -> frozenset[str]:
+        """Names of the metadata records that must carry a checksum."""
+        return OUR_METADATA if self.ours else frozenset()
 
     def topics(self) -> dict[int, Topic]:
         """Channel id -> topic with its fields, for the channels that this program declares.
@@ -121,6 +127,7 @@ def _verify(contents: Contents, end: Record, data: bytes) -> None:
     crc = parse(end).data_section_crc
     if (crc or contents.ours) and crc != zlib.crc32(memoryview(data)[: end.start]):
         raise Damage("the file does not match its checksum", end.start)
+    contents.verified = bool(crc) or contents.ours
 
 
 def take(contents: Contents, record: Record) -> None:
@@ -131,9 +138,7 @@ def take(contents: Contents, record: Record) -> None:
     elif opcode == Opcode.MESSAGE:
         contents.messages.append(record)
     elif opcode == Opcode.METADATA:
-        found = parse_metadata(record, False)
-        if contents.ours and found.name in OUR_METADATA:
-            found = parse_metadata(record, True)
+        found = parse_metadata(record, contents.signed)
         contents.metadata[found.name] = found.metadata
     elif opcode == Opcode.ATTACHMENT:
         attachment = parse_attachment(record)

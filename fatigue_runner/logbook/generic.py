@@ -75,8 +75,9 @@ class _Decoder:
     """Takes schemas, channels and messages as they come, in chunks and outside."""
 
     def __init__(self, contents: Contents) -> None:
-        self.schemas = dict(contents.schemas)
-        self.channels = dict(contents.channels)
+        # Those declared inside chunks join those outside.
+        self.schemas = contents.schemas
+        self.channels = contents.channels
         self.columns: dict[int, _Column | None] = {}
 
     def take(self, record: Record) -> None:

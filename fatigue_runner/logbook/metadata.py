@@ -74,7 +74,7 @@ def read_summary(path: str | os.PathLike[str]) -> tuple[Index, dict[str, dict[st
                 if record.opcode != Opcode.METADATA:
                     raise Damage("a metadata index is wrong", entry.offset)
                 record = Record(record.opcode, entry.offset, entry.offset + entry.length, record.body)
-                found = parse_metadata(record, entry.name in OUR_METADATA)
+                found = parse_metadata(record, OUR_METADATA)
                 metadata[found.name] = found.metadata
             return index, metadata
     except OSError:

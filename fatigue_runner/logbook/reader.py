@@ -53,7 +53,12 @@ def row_layout(contents: Contents) -> RowLayout | None:
     """The layout of our log's rows, None for other files. Raises LogError for damaged declarations."""
     if not contents.ours or not contents.channels:
         return None
-    topics = [replace(topic, channel_id=number) for number, topic in contents.topics().items()]
+    try:
+        topics = [replace(topic, channel_id=number) for number, topic in contents.topics().items()]
+    except LogError:
+        if contents.verified:  # not damaged, so another program's
+            return None
+        raise
     order = list(TOPICS)
     return RowLayout(sorted(topics, key=lambda t: order.index(t.key)))
 
@@ -79,7 +84,10 @@ def join(pieces: Sequence[Tables]) -> Tables:
 
 
 def _decode_fixed(contents: Contents, layout: RowLayout) -> tuple[Tables, list[Damage]] | None:
-    """Columns up to the first damaged chunk, and that damage; None where a chunk has another layout."""
+    """Columns up to the first damaged chunk, and that damage; None where a chunk has another layout.
+
+    The generic decoder is trusted with another layout only where a checksum vouches for the declarations.
+    """
     pieces: list[Tables] = []
     damages: list[Damage] = []
     count = 0
@@ -90,13 +98,24 @@ def _decode_fixed(contents: Contents, layout: RowLayout) -> tuple[Tables, list[D
             damages.append(damage)
             break
         rows = layout.rows_in(plain, count)
-        if rows is None:
+        if rows is None and contents.verified:
             return None
+        if rows is None:
+            damages.append(Damage("rows are missing, or their topics are", record.start))
+            break
         pieces.append(chunk_tables(layout, rows, count))
         count += len(rows)
     if not pieces:
         pieces.append(chunk_tables(layout, np.empty(0, layout.dtype), 0))
     return join(pieces), damages
+
+
+def _from_first_row(tables: Tables) -> None:
+    """Drop the status of the interval before the first row, which a window cut out of a log begins with."""
+    times = [t["_log_time"] for key, t in tables.items() if key != "status"]
+    status = tables.get("status")
+    if status and times and (status["_log_time"][:1] == times[0][:1]).any():
+        tables["status"] = {name: values[1:] for name, values in status.items()}
 
 
 def _common_rows(tables: Tables) -> int:
@@ -118,8 +137,8 @@ def _common_rows(tables: Tables) -> int:
 def _whole_rows(tables: Tables, ours: bool) -> tuple[int, str]:
     """Rows from the first that fit together, and what is wrong with the next one (empty when nothing is)."""
     rows = _common_rows(tables)
-    longest = max(len(t["_log_time"]) + (key == "status") for key, t in tables.items())
-    what = "" if rows == longest or not longest else "the topics do not have the same times"
+    lengths = [len(t["_log_time"]) + (key == "status") for key, t in tables.items() if len(t["_log_time"])]
+    what = "" if rows == max(lengths, default=0) else "the topics do not have the same times"
     for key, table in tables.items() if ours else ():
         steps = np.diff(table["_sequence"].astype(np.int64)) != 1
         if steps.any():
@@ -208,11 +227,15 @@ def read_log(path: str | os.PathLike[str], *, partial: bool = False) -> Log:
     contents.damages.extend(found)
     if all(key == "status" for key in tables):
         raise _no_turbine_log(path, contents, tables)
+    _from_first_row(tables)
     rows, what = _whole_rows(tables, contents.ours)
+    if contents.damages and not rows:
+        raise _no_turbine_log(path, contents, tables)
     log = assemble(tables, rows, max(rows - 1, 0), contents)
     damages = [str(d) for d in contents.damages] + [f"{what} from row {rows} on"] * bool(what)
     if damages and not partial:
         raise _refusal(path, damages[0], log, bool(contents.damages))
     log.lost = "; ".join(damages)
-    log.complete = not damages and (not contents.ours or log.result.get("rows") == str(rows))
+    expected = log.result.get("rows", "" if contents.ours else str(rows))
+    log.complete = not damages and expected == str(rows)
     return log

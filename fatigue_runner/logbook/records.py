@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
@@ -102,12 +102,15 @@ def parse(record: Record) -> Any:
         raise Damage(f"a {opcode.name.lower().replace('_', ' ')} record is damaged", record.start) from None
 
 
-def parse_metadata(record: Record, must_be_signed: bool) -> Metadata:
-    """A Metadata record without its checksum entry. Raises Damage where that is wrong, or absent but due."""
+def parse_metadata(record: Record, signed: Collection[str]) -> Metadata:
+    """A Metadata record without its checksum entry; signed: the names that must have one.
+
+    Raises Damage where the checksum is wrong, or absent but due.
+    """
     found: Metadata = parse(record)
     checksum = found.metadata.pop(CHECKSUM_KEY, None)
     wrong = checksum is not None and checksum != metadata_checksum(found.name, found.metadata)
-    if wrong or (checksum is None and must_be_signed):
+    if wrong or (checksum is None and found.name in signed):
         raise Damage(f"metadata {found.name!r} is damaged", record.start)
     return found
 

@@ -12,7 +12,7 @@ from mcap.records import Channel, Schema
 
 from fatigue_runner.logbook.check import Check, MessageOrder, check
 from fatigue_runner.logbook.container import Container, library_name
-from fatigue_runner.logbook.contents import OUR_METADATA, Contents, read_contents
+from fatigue_runner.logbook.contents import Contents, read_contents
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.files import read_bytes, refuse_if_being_written, replacing
 from fatigue_runner.logbook.reader import row_layout
@@ -53,7 +53,7 @@ class _Rebuild:
         self.container = Container(
             stream, header.library if header else library_name(), header.profile if header else ""
         )
-        self.order = MessageOrder(contents.ours)
+        self.order = MessageOrder(contents)
         self.lost: list[str] = []
         self.stopped: Damage | None = None
         self.dropped_chunks = 0
@@ -83,8 +83,7 @@ class _Rebuild:
                 self.lost.append(damage.what)
 
     def _metadata(self, record: Record) -> None:
-        found = parse_metadata(record, False)
-        parse_metadata(record, self.contents.ours and found.name in OUR_METADATA)
+        found = parse_metadata(record, self.contents.signed)
         # What a run said of its end does not hold for a log that ends earlier.
         if (
             found.name == "result"
@@ -101,6 +100,8 @@ class _Rebuild:
         if wrong:
             raise Damage(wrong, record.start)
         self._declare(plain)
+        if not set(entries) <= {c.id for c in self.container.index.channels}:
+            raise Damage("the declaration of a topic is lost", record.start)
         places = {channel_id: found[:, :2] for channel_id, found in entries.items()}
         if places:
             size, crc = chunk.uncompressed_size, chunk.uncompressed_crc

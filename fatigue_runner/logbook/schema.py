@@ -153,7 +153,12 @@ def known_topic(topic_name: str, schema_name: str, data: bytes) -> Topic | None:
         if known is not numbers.get(f.number) or (known and known.kind != f.kind):
             raise LogError(f"the schema of topic {topic_name!r} is damaged at field {f.name!r}")
     units = {f.name: f.unit for f in by_topic.fields}
-    return replace(by_topic, fields=tuple(replace(f, unit=units.get(f.name, "-")) for f in fields))
+    found = replace(by_topic, fields=tuple(replace(f, unit=units.get(f.name, "-")) for f in fields))
+    # A flipped bit can also hide a field; the rest then reads well, so only the same bytes are the same
+    # schema.
+    if descriptor_set(found) != data:
+        raise LogError(f"the schema of topic {topic_name!r} is damaged")
+    return found
 
 
 def select_topics(keys: Iterable[str] | None) -> tuple[Topic, ...]:

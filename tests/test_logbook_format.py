@@ -1,0 +1,191 @@
+"""The file format: every MCAP reader opens a log, and its schemas stay readable for ever."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from logbook_example import ATTACHMENTS, RESULT, RUN, example
+from mcap.opcode import Opcode
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import Schema
+from mcap.stream_reader import StreamReader
+from mcap_protobuf.decoder import DecoderFactory
+
+from fatigue_runner.logbook import write_log
+from fatigue_runner.logbook.generic import message_class
+from fatigue_runner.logbook.records import walk
+from fatigue_runner.logbook.schema import TOPICS, descriptor_set, fields_in
+
+COMPRESSIONS = ("zstd", "lz4", "none")
+
+
+@pytest.fixture(scope="module", params=COMPRESSIONS)
+def log_path(request, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("logs") / f"{request.param}.mcap"
+    return write_log(path, example(3000), RUN, ATTACHMENTS, RESULT, compression=request.param)
+
+
+def test_the_librarys_seeking_reader_accepts_it_with_checksums(log_path):
+    with open(log_path, "rb") as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        decoded = list(reader.iter_decoded_messages(topics="/turbine/loads"))
+    assert summary.statistics.message_count == 4 * 3000 - 1
+    assert len(summary.chunk_indexes) == summary.statistics.chunk_count > 1
+    thrust = example(3000).loads["rotor_thrust"]
+    assert [d.decoded_message.rotor_thrust for d in decoded] == thrust.tolist()
+    assert [d.message.sequence for d in decoded] == list(range(3000))
+
+
+def test_the_librarys_stream_reader_accepts_it_with_checksums(log_path):
+    records = [type(r).__name__ for r in StreamReader(str(log_path), validate_crcs=True).records]
+    assert records.count("Message") == 4 * 3000 - 1
+
+
+def test_the_librarys_non_seeking_reader_accepts_it_with_checksums(log_path):
+    reader = NonSeekingReader(
+        io.BytesIO(log_path.read_bytes()), validate_crcs=True, decoder_factories=[DecoderFactory()]
+    )
+    status = list(reader.iter_decoded_messages(topics="/solver/status", log_time_order=False))
+    assert [d.decoded_message.accepted for d in status] == example(3000).accepted.tolist()
+
+
+def test_a_message_index_leads_to_each_message(log_path):
+    """A seek by time uses the message indexes; viewers scrub with them."""
+    with open(log_path, "rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        found = list(reader.iter_messages(starting_at=20_000_000_000, ending_before=20_100_000_000))
+    assert len(found) == 4 * 5
+    assert {m.log_time for _, _, m in found} == {20_000_000_000 + k * 20_000_000 for k in range(5)}
+
+
+def test_the_status_of_an_interval_has_the_time_and_number_of_its_end(log_path):
+    with open(log_path, "rb") as stream:
+        first = next(make_reader(stream).iter_messages(topics="/solver/status"))[2]
+    assert (first.sequence, first.log_time) == (1, 20_000_000)
+
+
+def test_run_units_and_attachments_come_before_the_first_chunk_and_the_result_last(log_path):
+    records = [r for r in walk(log_path.read_bytes()) if r.opcode != Opcode.MESSAGE_INDEX]
+    kinds = [Opcode(r.opcode).name for r in records]
+    first_chunk = kinds.index("CHUNK")
+    before = kinds[:first_chunk]
+    assert before[:4] == ["HEADER", "METADATA", "ATTACHMENT", "ATTACHMENT"]
+    assert before.count("CHANNEL") == before.count("SCHEMA") == 4 and before.count("METADATA") == 2
+    assert kinds[kinds.index("DATA_END") - 1] == "METADATA"
+
+
+def test_summary_has_all_that_viewers_need(log_path):
+    kinds = [Opcode(r.opcode) for r in walk(log_path.read_bytes())]
+    summary = kinds[kinds.index(Opcode.DATA_END) + 1 :]
+    assert [summary.count(k) for k in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)] == [4, 4, 1]
+    assert summary.count(Opcode.CHUNK_INDEX) == kinds.count(Opcode.CHUNK)
+    assert summary.count(Opcode.SUMMARY_OFFSET) == 6
+
+
+_NODE_SCRIPT = """
+const { McapIndexedReader, McapStreamReader } = require('@mcap/core');
+const { loadDecompressHandlers } = require('@mcap/support');
+const fs = require('fs');
+(async () => {
+  const data = fs.readFileSync(process.argv[2]);
+  const decompressHandlers = await loadDecompressHandlers();
+  const readable = { size: async () => BigInt(data.length),
+    read: async (o, n) => new Uint8Array(data.subarray(Number(o), Number(o + n))) };
+  const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
+  let indexed = 0; for await (const m of reader.readMessages()) indexed++;
+  const stream = new McapStreamReader({ decompressHandlers, validateCrcs: true });
+  stream.append(new Uint8Array(data));
+  let streamed = 0, r; while ((r = stream.nextRecord())) if (r.type === 'Message') streamed++;
+  console.log(JSON.stringify({ indexed, streamed, done: stream.done() }));
+})();
+"""
+
+
+@pytest.mark.slow
+def test_the_javascript_readers_of_foxglove_accept_it(log_path, tmp_path):
+    npm, node = shutil.which("npm"), shutil.which("node")
+    if not npm or not node:
+        pytest.skip("npm and node are not installed")
+    packages = ["@mcap/core@2", "@mcap/support@1"]
+    command = [npm, "install", "--no-audit", "--no-fund", "--prefix", str(tmp_path), *packages]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    if done.returncode:
+        pytest.skip(f"npm cannot install @mcap/core: {done.stderr.strip().splitlines()[-1:]}")
+    script = tmp_path / "read.js"
+    script.write_text(_NODE_SCRIPT)
+    done = subprocess.run([node, str(script), str(log_path)], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == {"indexed": 11999, "streamed": 11999, "done": True}
+
+
+# --- schema
+# -----------------------------------------------------------------------------------------------------
+
+
+# The first release's channels. Field numbers are positions in these lists plus 2, for ever.
+FIRST_STATES = [
+    "tower_fore_aft",
+    "tower_side_side",
+    "blade1_flap",
+    "blade2_flap",
+    "blade3_flap",
+    "edge",
+    "rotor_azimuth",
+    "generator_azimuth",
+    "tower_fore_aft_velocity",
+    "tower_side_side_velocity",
+    "blade1_flap_velocity",
+    "blade2_flap_velocity",
+    "blade3_flap_velocity",
+    "edge_velocity",
+    "rotor_speed",
+    "generator_speed",
+]
+FIRST_LOADS = [
+    "tower_base_fore_aft_moment",
+    "tower_base_side_side_moment",
+    "blade1_root_flapwise_moment",
+    "blade2_root_flapwise_moment",
+    "blade3_root_flapwise_moment",
+    "blade1_root_edgewise_moment",
+    "blade2_root_edgewise_moment",
+    "blade3_root_edgewise_moment",
+    "low_speed_shaft_torque",
+    "rotor_thrust",
+    "generator_torque",
+    "blade1_tip_out_of_plane",
+    "blade2_tip_out_of_plane",
+    "blade3_tip_out_of_plane",
+    "blade1_tip_in_plane",
+    "blade2_tip_in_plane",
+    "blade3_tip_in_plane",
+    "tower_top_fore_aft_acceleration",
+    "tower_top_side_side_acceleration",
+]
+FIRST_WIND = ["wind_speed", "vertical_shear", "horizontal_shear"]
+FIRST_STATUS = ["accepted", "discrepancy", "threshold", "local_error", "reference_error", "clamped_lookups"]
+
+
+@pytest.mark.parametrize(
+    ("key", "names"),
+    [("state", FIRST_STATES), ("loads", FIRST_LOADS), ("wind", FIRST_WIND), ("status", FIRST_STATUS)],
+)
+def test_field_numbers_never_change(key, names):
+    """Logs of years ago must stay readable: a name may be added with a new number, never moved."""
+    numbers = {f.name: f.number for f in TOPICS[key].fields}
+    assert {"time": 1, **{name: i + 2 for i, name in enumerate(names)}}.items() <= numbers.items()
+
+
+def test_schemas_are_flat_proto3_that_protobuf_itself_accepts():
+    for topic in TOPICS.values():
+        data = descriptor_set(topic)
+        assert fields_in(data, topic.schema_name) is not None
+        message = message_class(Schema(1, data, "protobuf", topic.schema_name))
+        assert [f.name for f in message.DESCRIPTOR.fields] == list(topic.field_names)
+        assert all(f.message_type is None for f in message.DESCRIPTOR.fields)
