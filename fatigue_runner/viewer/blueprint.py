@@ -1,0 +1,171 @@
+"""The first screen: the turbine large, beside it what an engineer looks at first; everything else a tab away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from fatigue_runner import channels
+from fatigue_runner.viewer.cases import Viewed
+from fatigue_runner.viewer.recording import TIMELINE, read_unit
+
+LONGEST_WHOLE = 180.0  # s; oscillations of a longer log would be a solid band
+_BACKGROUND = [24, 28, 36]
+
+
+def first_screen(cases: Sequence[Viewed], playing: bool = True) -> rrb.Blueprint:
+    """Scene, main plots and the tabs of the rest, for what these cases hold."""
+    tabs = [overview(cases), _all_loads(cases), _all_states(cases)]
+    solver = _solver_plots(cases)
+    if solver:
+        tabs.append(rrb.Vertical(*solver, name="Solver"))
+    return rrb.Blueprint(
+        rrb.Tabs(*tabs, active_tab=0),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=TIMELINE,
+            play_state="playing" if playing else "paused",
+            loop_mode="all",
+        ),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def overview(cases: Sequence[Viewed]) -> rrb.Container:
+    """Scene and the few plots that say how the run goes: beside one turbine, below a row of them."""
+    plots = [
+        _plot("Blade root flapwise moment [MN·m]", cases, _blades("load", "root_flapwise_moment", cases)),
+        _plot("Tower-base fore-aft moment [MN·m]", cases, ["load/tower_base_fore_aft_moment"]),
+        *_solver_plots(cases)[:2],
+    ]
+    if len(cases) > 1 and any(_has(case, "reference_error") for case in cases):
+        # curves of good integrators lie on each other: their errors do not
+        plots[3:] = [_error_plot(cases)]
+    if len(plots) < 4:
+        plots.append(_plot("Wind speed at the hub [m/s]", cases[:1], ["wind/wind_speed"]))
+    if len(plots) < 4:
+        plots.append(_plot("Rotor speed [rpm]", cases, ["state/rotor_speed"]))
+    if len(cases) == 1:
+        return rrb.Horizontal(scene_view(cases), rrb.Vertical(*plots), column_shares=[3, 2], name="Turbine")
+    rows = [rrb.Horizontal(*plots[i : i + 2]) for i in (0, 2)]
+    return rrb.Vertical(scene_view(cases), *rows, row_shares=[5, 3, 3], name="Turbines")
+
+
+def scene_view(cases: Sequence[Viewed]) -> rrb.Spatial3DView:
+    """The turbines from upwind and from the side, so that bending out of the rotor plane is seen."""
+    shape = cases[0].geometry
+    middle = sum(case.offset for case in cases) / len(cases)
+    if len(cases) == 1:
+        target, away, aside = [0.0, 10.0, 0.78 * shape.hub_height], 3.2 * shape.radius, 0.62
+    else:
+        away, aside = shape.radius * (2.2 + 0.55 * (len(cases) - 1)), 0.25
+        target = [0.0, middle + 20.0, 0.80 * shape.hub_height]
+    eye = [-away * (1 - aside**2) ** 0.5, target[1] - 10.0 + aside * away, 0.75 * shape.hub_height]
+    return rrb.Spatial3DView(
+        origin="scene",
+        name="Turbine" if len(cases) == 1 else "Turbines",
+        background=_BACKGROUND,
+        line_grid=rrb.LineGrid3D(visible=True, spacing=20.0, color=[70, 80, 95, 90]),
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=[0.0, 0.0, 1.0]),
+    )
+
+
+def _time_axis(cases: Sequence[Viewed]) -> rrb.TimeAxis:
+    """A short log whole, of a long one a minute around the cursor."""
+    last = max(float(case.log.time[-1]) for case in cases)
+    if last <= LONGEST_WHOLE:
+        ends = [rr.TimeRangeBoundary.absolute(seconds=t) for t in (0.0, last)]
+    else:
+        ends = [rr.TimeRangeBoundary.cursor_relative(seconds=t) for t in (-30.0, 30.0)]
+    return rrb.TimeAxis(view_range=rr.TimeRange(*ends))
+
+
+def _plot(
+    name: str, cases: Sequence[Viewed], paths: Sequence[str], y: tuple[float, float] | None = None
+) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin="/",
+        name=name,
+        contents=[f"/plots/{path}/{case.key}" for path in paths for case in cases],
+        axis_x=_time_axis(cases),
+        axis_y=rrb.ScalarAxis(range=y) if y else None,
+        plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.RightTop),
+    )
+
+
+def _blades(group: str, what: str, cases: Sequence[Viewed]) -> list[str]:
+    """All three blades of one case, blade 1 of several."""
+    return [f"{group}/blade{i}_{what}" for i in ((1,) if len(cases) > 1 else (1, 2, 3))]
+
+
+def _solver_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
+    """Only those for which a case holds figures."""
+    plots = []
+    guarded = [case for case in cases if case.is_guarded]
+    if guarded:
+        plots.append(
+            _plot(
+                "Network trusted: accepted (green, 1) or fallen back (red, 0)",
+                guarded,
+                ["solver/accepted"],
+                (-0.4, 1.4),
+            )
+        )
+        plots.append(
+            _plot("log10 of discrepancy and threshold", guarded, ["solver/discrepancy", "solver/threshold"])
+        )
+    if any(_has(case, "reference_error") for case in cases):
+        plots.append(_error_plot(cases))
+    holding = [case for case in cases if _has(case, "local_error")]
+    if holding:
+        plots.append(_plot("log10 of the local error estimate", holding, ["solver/local_error"]))
+    return plots
+
+
+def _error_plot(cases: Sequence[Viewed]) -> rrb.TimeSeriesView:
+    holding = [case for case in cases if _has(case, "reference_error")]
+    return _plot(
+        "log10 of the error against the reference, in ranges of the state",
+        holding,
+        ["solver/reference_error"],
+    )
+
+
+def _has(case: Viewed, name: str) -> bool:
+    values = getattr(case.log, name)
+    return bool((values > 0).any())
+
+
+def _all_loads(cases: Sequence[Viewed]) -> rrb.Grid:
+    held = [name for name in channels.LOAD_NAMES if any(name in case.log.loads for case in cases)]
+    groups: dict[str, list[str]] = {}
+    for name in held:
+        if len(cases) > 1 and name.startswith(("blade2", "blade3")):
+            continue
+        label = f"{_blade_free(channels.BY_NAME[name].label, len(cases) == 1)} [{read_unit(name)[0]}]"
+        groups.setdefault(label, []).append(f"load/{name}")
+    return rrb.Grid(*(_plot(label, cases, paths) for label, paths in groups.items()), name="Loads")
+
+
+def _all_states(cases: Sequence[Viewed]) -> rrb.Grid:
+    groups: dict[str, list[str]] = {}
+    for channel in channels.STATES:
+        if len(cases) > 1 and channel.name.startswith(("blade2", "blade3")):
+            continue
+        label = f"{_blade_free(channel.label, len(cases) == 1)} [{channel.read_unit}]"
+        groups.setdefault(label, []).append(f"state/{channel.name}")
+    for channel in channels.WIND_SIGNALS:
+        groups[f"{channel.label} [{channel.read_unit}]"] = [f"wind/{channel.name}"]
+    return rrb.Grid(*(_plot(label, cases, paths) for label, paths in groups.items()), name="States and wind")
+
+
+def _blade_free(label: str, together: bool) -> str:
+    """The same label for all blades, where they share a plot."""
+    for blade in ("blade 1 ", "blade 2 ", "blade 3 ") if together else ():
+        label = label.replace(blade, "blades: ")
+    return label

@@ -1,0 +1,192 @@
+"""What is to be seen: the logs that were asked for, the reference beside them, and how each is named and coloured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import radians
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.logbook import Log, LogError, read_log, read_metadata
+from fatigue_runner.turbine.parameters import read_turbine_file
+from fatigue_runner.viewer import colours
+from fatigue_runner.viewer.scene import Geometry, geometry
+from fatigue_runner.viewer.shapes import BladeSkin, blade_skin
+
+MAX_CASES = 4  # side by side; more turbines are too small to see
+_WIND_KEYS = (
+    "wind",
+    "wind_source",
+    "wind_speed",
+    "vertical_shear",
+    "horizontal_shear",
+    "turbulence_intensity",
+    "seed",
+)
+
+
+@dataclass
+class Viewed:
+    """One log on the stage. key: its name in entity paths; label: as a person reads it; offset [m] sideways."""
+
+    log: Log
+    key: str
+    label: str
+    colour: tuple[int, int, int]
+    geometry: Geometry
+    skin: BladeSkin
+    is_reference: bool = False
+    offset: float = 0.0
+
+    @property
+    def is_guarded(self) -> bool:
+        """Whether steps were tested against a threshold (the hybrid integrators)."""
+        return bool(np.isfinite(self.log.threshold).any())
+
+
+def find_logs(paths: Sequence[Path], case: str | None = None) -> list[Path]:
+    """The logs to show: files as they are; of a run folder the logs of one wind, every integrator of it.
+
+    case: id of a case in the folder, shown with the other integrators of its wind; default: the first wind that
+    has a hybrid, else the first. Raises InputError where there is nothing to show.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found += _of_folder(path, case)
+        elif path.exists():
+            found.append(path)
+        else:
+            raise InputError(f"{path} does not exist; give a log (.mcap) or the folder that `run` wrote")
+    return list(dict.fromkeys(found))[:MAX_CASES]
+
+
+def _of_folder(folder: Path, case: str | None) -> list[Path]:
+    place = folder / "logs" if (folder / "logs").is_dir() else folder
+    logs = {path.name.removesuffix(".mcap"): path for path in sorted(place.glob("*.mcap"))}
+    if not logs:
+        raise InputError(
+            f"there is no log (.mcap) in {place}; `run` writes them unless `log: enabled: false`"
+        )
+    if case is not None and case not in logs:
+        raise InputError(f"there is no log of case {case!r} in {place}{did_you_mean(case, logs)}")
+    runs = {name: _run_of(path) for name, path in logs.items()}
+    chosen = case or next(iter(logs))
+    same = [name for name in logs if _wind_of(runs[name]) == _wind_of(runs[chosen]) and name != chosen]
+    # the reference first, so that it is among the few that are shown
+    same.sort(key=lambda name: runs[name].get("is_reference") != "True")
+    return [logs[name] for name in [chosen, *same]]
+
+
+def _run_of(path: Path) -> dict[str, str]:
+    try:
+        return read_metadata(path).get("run", {})
+    except LogError:
+        return {}  # shown to the user when it is this log that is to be read
+
+
+def _wind_of(run: dict[str, str]) -> tuple[str | None, ...]:
+    return tuple(run.get(key) for key in _WIND_KEYS)
+
+
+def read_cases(paths: Sequence[Path], turbine: str | None = None) -> list[Viewed]:
+    """Read logs for the stage, the reference first. turbine: name or file, default as the logs say.
+
+    A damaged log is shown up to where it is good. Raises InputError where a file is no log of a turbine, has no states,
+    or was made with another turbine than the one that would be drawn.
+    """
+    logs = [(path, _readable(path)) for path in paths]
+    logs.sort(key=lambda item: not _is_reference(item[1]))
+    viewed: list[Viewed] = []
+    others = 0
+    for place, (path, log) in enumerate(logs):
+        mapping = read_turbine_file(turbine or turbine_of(log))
+        shape = geometry(mapping, radians(_number(log.run.get("pitch_deg"))))
+        check_turbine(path, log, shape)
+        reference = _is_reference(log)
+        colour = colours.REFERENCE if reference else colours.INTEGRATORS[others % len(colours.INTEGRATORS)]
+        others += not reference
+        viewed.append(
+            Viewed(
+                log=log,
+                key=f"{place + 1}_{_entity_name(label_of(path, log))}",
+                label=label_of(path, log),
+                colour=colour,
+                geometry=shape,
+                skin=blade_skin(mapping, shape),
+                is_reference=reference,
+                offset=-place * 2.4 * shape.radius,  # to the right of who looks downwind
+            )
+        )
+    return viewed
+
+
+def _readable(path: Path) -> Log:
+    log = read_log(path, partial=True)
+    if not len(log.state):
+        raise InputError(
+            f"{path} holds no states to show; keep topic `state` in the campaign's `log: topics`"
+        )
+    if not np.isfinite(log.state[:, :8]).any():
+        raise InputError(
+            f"{path} holds no positions to show, only {', '.join(log.loads) or 'other channels'}"
+        )
+    return log
+
+
+def turbine_of(log: Log) -> str:
+    """Name or file of the turbine that a log was made with."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    text = log.attachments.get("campaign.yaml", b"")
+    try:
+        given: Any = YAML(typ="safe", pure=True).load(text.decode()) if text else None
+    except (YAMLError, UnicodeDecodeError):
+        given = None
+    source = given.get("turbine") if isinstance(given, dict) else None
+    return str(source or log.run.get("turbine") or "nrel5mw")
+
+
+def check_turbine(path: Path, log: Log, shape: Geometry) -> None:
+    """Refuse a turbine whose blades would not bend as the log says: its tip deflections are the log's to rounding."""
+    names = [f"blade{i}_tip_{way}" for i in (1, 2, 3) for way in ("out_of_plane", "in_plane")]
+    if not all(name in log.loads for name in names):
+        return
+    logged = np.stack([log.loads[name] for name in names], axis=1)
+    drawn = shape.tip_channels(log.state).reshape(len(logged), 6)
+    known = np.isfinite(logged) & np.isfinite(drawn)
+    if known.any() and np.abs(np.where(known, logged - drawn, 0.0)).max() > 1e-3:
+        raise InputError(
+            f"{path} was made with another turbine than {shape.name}: its blade tips are not where the log says; "
+            "give the right one with --turbine"
+        )
+
+
+def label_of(path: Path, log: Log) -> str:
+    """As a person calls the integrator of a log: `rk3, 20 ms (hybrid)`; the file's name where the log does not say."""
+    method, step = log.run.get("method"), _number(log.run.get("step"))
+    if not method:
+        return path.name.removesuffix(".part").removesuffix(".mcap")
+    mode = log.run.get("mode")
+    label = f"{method}, {step * 1e3:g} ms" + (f" ({mode})" if mode else "")
+    return f"{label}: reference" if _is_reference(log) else label
+
+
+def _is_reference(log: Log) -> bool:
+    return log.run.get("is_reference") == "True"
+
+
+def _number(text: str | None) -> float:
+    try:
+        return float(text or 0.0)
+    except ValueError:
+        return 0.0
+
+
+def _entity_name(label: str) -> str:
+    return "".join(c if c.isalnum() else "_" for c in label).strip("_")

@@ -1,0 +1,346 @@
+"""From logs to a Rerun recording: what stands still once, then blocks of rows as columns.
+
+A recording is filled block by block (`Stage.send`), so that a whole log and a log that is being played go the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from fatigue_runner import channels
+from fatigue_runner.viewer import colours, shapes
+from fatigue_runner.viewer.cases import Viewed
+from fatigue_runner.viewer.scene import local_wind
+
+TIMELINE = "time"
+FRAME_RATE = 20.0  # Hz, of the 3-D scene; series keep the log's rate
+MAX_FRAMES = 8000  # in all turbines together; a frame is 5 kB
+WIND_RATE = 4.0  # Hz, colours of the rotor disc
+BAND_POINTS = 4000  # a band of more points looks the same and draws slower
+TOWER_LEVELS = 9
+BLOCK = 4096  # rows per message
+
+_WHITE, _GREY, _BLUE = (232, 236, 240), (150, 158, 168), (92, 104, 122)
+
+
+class Stage:
+    """Cases on a recording. scale: times true deflection. Ranges of colours are those of all cases together."""
+
+    def __init__(self, recording: rr.RecordingStream, cases: Sequence[Viewed], scale: float = 1.0) -> None:
+        self.recording, self.cases, self.scale = recording, cases, scale
+        self.flap_range = _range([_flap(case) for case in cases])
+        self.wind_range = _range([_disc_wind(case, slice(None)) for case in cases])
+
+    def set_up(self) -> None:
+        """All that does not move: ground, names and colours of series, skins, the scales' legend."""
+        self._log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        for case in self.cases:
+            self._set_up_scene(case)
+            _series_style(self.recording, case, len(self.cases) > 1)
+        self._legend()
+
+    def _log(self, path: str, what: Any) -> None:
+        self.recording.log(path, what, static=True)
+
+    def _set_up_scene(self, case: Viewed) -> None:
+        root = f"scene/{case.key}"
+        place = [0.0, case.offset, 0.0]
+        self._log(root, rr.Transform3D(translation=place))
+        self._log(
+            f"{root}/tower",
+            rr.Mesh3D.from_fields(
+                triangle_indices=shapes.tower_triangles(TOWER_LEVELS), albedo_factor=_WHITE
+            ),
+        )
+        for name, skin, colour in (
+            ("nacelle", shapes.nacelle_skin(case.geometry), _WHITE),
+            ("hub", shapes.hub_skin(case.geometry), _GREY),
+        ):
+            self._log(
+                f"{root}/{name}",
+                rr.Mesh3D(
+                    vertex_positions=skin[0],
+                    triangle_indices=skin[1],
+                    albedo_factor=colour,
+                    vertex_normals=normals(skin[0][None], skin[1])[0],
+                ),
+            )
+        for blade in (1, 2, 3):
+            self._log(f"{root}/blade{blade}", rr.Mesh3D.from_fields(triangle_indices=case.skin.triangles()))
+        points, triangles = shapes.disc_points(case.geometry)
+        disc = np.column_stack(
+            [np.full(len(points), _disc_x(case)), points + np.array([0.0, case.geometry.hub_height])]
+        )
+        self._log(
+            f"{root}/wind",
+            rr.Mesh3D.from_fields(
+                vertex_positions=disc, triangle_indices=triangles, albedo_factor=(255, 255, 255, 90)
+            ),
+        )
+        # straight pitch axes under the hub's frame: how far the blades bend is the distance to them
+        straight = case.geometry.straight_blades()
+        self._log(
+            f"{root}/hub/straight",
+            rr.LineStrips3D(list(straight), colors=[_GREY], radii=rr.Radius.ui_points(0.8)),
+        )
+        self._log(
+            f"{root}/label",
+            rr.Points3D(
+                [[0.0, 0.0, -6.0]], radii=0.01, labels=[case.label], colors=[case.colour], show_labels=True
+            ),
+        )
+        ring = np.linspace(0, 2 * np.pi, 73)
+        pads = [np.column_stack([r * np.cos(ring), r * np.sin(ring), 0 * ring]) for r in (5.0, 30.0, 60.0)]
+        self._log(f"{root}/ground", rr.LineStrips3D(pads, colors=[_BLUE], radii=rr.Radius.ui_points(0.7)))
+
+    def _legend(self) -> None:
+        """Scales of the two colours, standing beside the first turbine."""
+        case = self.cases[0]
+        for name, scale, (low, high), side, unit, factor in (
+            ("flap moment", colours.FLAP_SCALE, self.flap_range, 12.0, "MN·m", 1e-6),
+            ("wind", colours.WIND_SCALE, self.wind_range, 34.0, "m/s", 1.0),
+        ):  # fmt: skip
+            if not np.isfinite([low, high]).all():
+                continue
+            wide = 1.0 + 0.5 * (len(self.cases) - 1)  # seen from farther away
+            x, y = 0.0, case.offset + case.geometry.radius + side * wide
+            z = np.linspace(6.0, 46.0, 21)
+            strips = [[[x, y, a], [x, y, b]] for a, b in pairwise(z)]
+            shade = colours.on_scale(np.arange(20), 0, 19, scale)
+            self._log(
+                f"scene/legend/{name.replace(' ', '_')}", rr.LineStrips3D(strips, colors=shade, radii=1.3)
+            )
+            marks = np.linspace(low, high, 3)
+            labels = [f"{value * factor:.3g} {unit}" for value in marks]
+            spots = [
+                [x, y + 9.0 * wide, 6.0],
+                [x, y + 9.0 * wide, 26.0],
+                [x, y + 9.0 * wide, 46.0],
+                [x, y, 54.0],
+            ]
+            self._log(
+                f"scene/legend/{name.replace(' ', '_')}/marks",
+                rr.Points3D(spots, radii=0.01, labels=[*labels, name], colors=[_GREY], show_labels=True),
+            )
+
+    def send(self, case: Viewed, start: int = 0, stop: int | None = None) -> None:
+        """Rows start..stop of a case's log, in blocks."""
+        stop = len(case.log.time) if stop is None else min(stop, len(case.log.time))
+        for first in range(start, stop, BLOCK):
+            rows = slice(first, min(first + BLOCK, stop))
+            self._send_series(case, rows)
+            self._send_scene(case, rows)
+
+    def _frames(self, case: Viewed, rows: slice, rate: float, most: int) -> np.ndarray:
+        """Rows of the slice that are frames of a slower clock: the same ones however the log is cut into blocks."""
+        count = len(case.log.time)
+        stride = max(1, int(np.ceil(count / most)))
+        if count > 1:
+            stride = max(stride, round((count - 1) / (case.log.duration * rate)) if case.log.duration else 1)
+        index = np.arange(rows.start, rows.stop)
+        return index[index % stride == 0]
+
+    def _columns(self, path: str, time: np.ndarray, *columns: Any) -> None:
+        self.recording.send_columns(
+            path,
+            [rr.TimeColumn(TIMELINE, duration=nanoseconds(time))],
+            [c for group in columns for c in group],
+        )
+
+    def _send_scene(self, case: Viewed, rows: slice) -> None:
+        frames = self._frames(case, rows, FRAME_RATE, MAX_FRAMES // len(self.cases))
+        frames = frames[np.isfinite(case.log.state[frames][:, :7]).all(axis=1)]
+        if len(frames):
+            self._send_turbine(case, frames)
+        frames = self._frames(case, rows, WIND_RATE, MAX_FRAMES // (4 * len(self.cases)))
+        if len(frames) and len(case.log.wind):
+            shade = colours.on_scale(_disc_wind(case, frames), *self.wind_range, colours.WIND_SCALE)
+            self._columns(
+                f"scene/{case.key}/wind",
+                case.log.time[frames],
+                rr.Mesh3D.columns(vertex_colors=colours.packed(shade).reshape(-1)).partition(
+                    [shade.shape[1]] * len(frames)
+                ),
+            )
+
+    def _send_turbine(self, case: Viewed, frames: np.ndarray) -> None:
+        pose = case.geometry.pose(case.log.state[frames], case.skin.radius, TOWER_LEVELS, self.scale)
+        time, root = case.log.time[frames], f"scene/{case.key}"
+        tower = shapes.tower_vertices(pose)
+        self._mesh(f"{root}/tower", time, tower, shapes.tower_triangles(TOWER_LEVELS))
+        for name, place, turn in (("nacelle", pose.top, pose.nacelle), ("hub", pose.apex, pose.rotor)):
+            self._columns(f"{root}/{name}", time, rr.Transform3D.columns(translation=place, mat3x3=turn))
+        blades = case.skin.vertices(pose)
+        flap = _flap(case)[frames]
+        shade = colours.packed(colours.on_scale(flap, *self.flap_range, colours.FLAP_SCALE))
+        for blade in range(3):
+            self._mesh(
+                f"{root}/blade{blade + 1}", time, blades[:, blade], case.skin.triangles(), shade[:, blade]
+            )
+
+    def _mesh(
+        self,
+        path: str,
+        time: np.ndarray,
+        vertices: np.ndarray,
+        triangles: np.ndarray,
+        shade: np.ndarray | None = None,
+    ) -> None:
+        """A moving surface; its normals are sent too, because the viewer draws a mesh without them flat."""
+        n, count = vertices.shape[:2]
+        surface = rr.Mesh3D.columns(
+            vertex_positions=vertices.reshape(-1, 3),
+            vertex_normals=normals(vertices, triangles).reshape(-1, 3),
+        ).partition([count] * n)
+        tint = () if shade is None else rr.Mesh3D.columns(albedo_factor=shade)
+        self._columns(path, time, surface, tint)
+
+    def _send_series(self, case: Viewed, rows: slice) -> None:
+        log = case.log
+        time = log.time[rows]
+        for place, channel in enumerate(channels.STATES):
+            self._series(
+                f"plots/state/{channel.name}/{case.key}", time, log.state[rows, place] * channel.scale
+            )
+        if len(log.wind):
+            for place, channel in enumerate(channels.WIND_SIGNALS):
+                self._series(f"plots/wind/{channel.name}/{case.key}", time, log.wind[rows, place])
+        for name, values in log.loads.items():
+            self._series(f"plots/load/{name}/{case.key}", time, values[rows] * read_unit(name)[1])
+        self._send_solver(case, rows)
+
+    def _send_solver(self, case: Viewed, rows: slice) -> None:
+        """What belongs to the interval that ends at a row; errors and norms by their logarithm, as they spread over decades."""
+        log = case.log
+        first = max(rows.start, 1)
+        within = slice(first - 1, rows.stop - 1)
+        time = log.time[first : rows.stop]
+        for name in SOLVER_SERIES:
+            values = getattr(log, name)[within]
+            if not len(values) or not np.isfinite(values).any():
+                continue
+            known = np.isfinite(values) & (values > 0)
+            self._series(
+                f"plots/solver/{name}/{case.key}", time[: len(values)][known], np.log10(values[known])
+            )
+        accepted = log.accepted[within]
+        if case.is_guarded and len(accepted):
+            self._send_band(case, within, time, accepted)
+
+    def _send_band(self, case: Viewed, within: slice, time: np.ndarray, accepted: np.ndarray) -> None:
+        """One mark per group of steps, red when any of them fell back."""
+        size = max(1, int(np.ceil(len(case.log.accepted) / BAND_POINTS)))
+        groups = np.arange(within.start, within.stop) // size
+        starts = np.flatnonzero(np.r_[True, np.diff(groups) > 0])
+        good = np.minimum.reduceat(accepted[: len(groups)].astype(np.uint8), starts)
+        shade = np.where(good[:, None] > 0, [*colours.ACCEPTED, 255], [*colours.REJECTED, 255]).astype(
+            np.uint8
+        )
+        self._columns(
+            f"plots/solver/accepted/{case.key}",
+            time[starts],
+            rr.Scalars.columns(scalars=good.astype(float)),
+            rr.SeriesPoints.columns(colors=colours.packed(shade)),
+        )
+
+    def _series(self, path: str, time: np.ndarray, values: np.ndarray) -> None:
+        if len(values):
+            self._columns(path, time, rr.Scalars.columns(scalars=np.asarray(values, float)))
+
+
+SOLVER_SERIES = ("discrepancy", "threshold", "local_error", "reference_error")
+
+
+def nanoseconds(time: np.ndarray) -> np.ndarray:
+    """Times [s] as timedelta64[ns]."""
+    return np.round(np.asarray(time) * 1e9).astype("timedelta64[ns]")
+
+
+def read_unit(name: str) -> tuple[str, float]:
+    """Unit in which a load is drawn, and the factor to it: MN·m for moments, else as `channels` says."""
+    if name.endswith("moment") or name == "low_speed_shaft_torque":
+        return "MN·m", 1e-6
+    channel = channels.BY_NAME.get(name)
+    return (channel.read_unit, channel.scale) if channel else ("", 1.0)
+
+
+def normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (n, vertices, 3) of moving surfaces (n, vertices, 3), averaged over the adjoining triangles."""
+    corner = vertices[:, triangles]
+    face = np.cross(corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0])
+    out = np.zeros_like(vertices)
+    for i in range(3):
+        order = np.argsort(triangles[:, i], kind="stable")
+        which, start = np.unique(triangles[order, i], return_index=True)
+        out[:, which] += np.add.reduceat(face[:, order], start, axis=1)
+    length = np.linalg.norm(out, axis=-1, keepdims=True)
+    return (out / np.where(length > 0, length, 1.0)).astype(np.float32)
+
+
+def _flap(case: Viewed) -> np.ndarray:
+    """(n, 3) root flapwise moments [N.m]; NaN where the log does not hold them."""
+    missing = np.full(len(case.log.time), np.nan)
+    return np.stack(
+        [case.log.loads.get(f"blade{i}_root_flapwise_moment", missing) for i in (1, 2, 3)], axis=1
+    )
+
+
+def _disc_wind(case: Viewed, rows: Any) -> np.ndarray:
+    """(rows, points) wind on the rotor disc [m/s]."""
+    if not len(case.log.wind):
+        return np.empty((0, 1))
+    y, z = shapes.disc_points(case.geometry)[0].T
+    wind = (
+        case.log.wind[rows]
+        if not isinstance(rows, slice)
+        else case.log.wind[rows][:: max(1, len(case.log.wind) // 500)]
+    )
+    return local_wind(wind, y, z, case.geometry.radius)
+
+
+def _disc_x(case: Viewed) -> float:
+    """A plane behind the nacelle [m]: seen from upwind, the blades keep their own colours in front of it."""
+    return 14.0
+
+
+def _range(values: Sequence[np.ndarray]) -> tuple[float, float]:
+    """Smallest and largest finite number of all arrays; NaN where there is none."""
+    known = [v[np.isfinite(v)] for v in values]
+    known = [v for v in known if v.size]
+    return (min(v.min() for v in known), max(v.max() for v in known)) if known else (np.nan, np.nan)
+
+
+def _series_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> None:
+    """Names and colours of all series of a case: by integrator where there are several, else by blade."""
+    groups = [("state", c) for c in channels.STATES] + [("wind", c) for c in channels.WIND_SIGNALS]
+    groups += [("load", channels.BY_NAME[n]) for n in case.log.loads if n in channels.BY_NAME]
+    for group, channel in groups:
+        blade = next((i for i in (1, 2, 3) if channel.name.startswith(f"blade{i}")), None)
+        colour, name = case.colour, case.label
+        if not several:
+            name = channel.label
+            colour = colours.BLADES[blade - 1] if blade else colours.INTEGRATORS[0]
+        style = rr.SeriesLines(names=name, colors=colour, widths=1.6 if not case.is_reference else 2.6)
+        recording.log(f"plots/{group}/{channel.name}/{case.key}", style, static=True)
+    for name, what, colour in (
+        ("discrepancy", "discrepancy", case.colour), ("threshold", "threshold", colours.REJECTED),
+        ("local_error", "local error estimate", case.colour), ("reference_error", "error", case.colour),
+    ):  # fmt: skip
+        recording.log(
+            f"plots/solver/{name}/{case.key}",
+            rr.SeriesLines(names=f"{case.label}: {what}" if several else what, colors=colour, widths=1.6),
+            static=True,
+        )
+    if case.is_guarded:
+        recording.log(
+            f"plots/solver/accepted/{case.key}",
+            rr.SeriesPoints(
+                names=f"{case.label}: accepted" if several else "accepted", markers="square", marker_sizes=7.0
+            ),
+            static=True,
+        )
