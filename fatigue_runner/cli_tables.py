@@ -49,18 +49,19 @@ def _table(results: Results, summaries: Any, console: Console) -> Any:
 
     fatigue = fatigue_columns(results.rows)
     channels = list(dict.fromkeys(channel for channel, _, _ in fatigue))
-    groups = {BY_NAME[channel].label.removesuffix(" moment"): [channel] for channel in channels}
-    if 66 + 13 * len(groups) > console.width:
+    labels = {channel: BY_NAME[channel].label.removesuffix(" moment") for channel in channels}
+    groups = {label.replace("blade ", "blade\u00a0"): [channel] for channel, label in labels.items()}
+    if 66 + 12 * len(groups) > console.width:
         groups = {"DEL error": channels}
     table = Table(
         box=box.SIMPLE_HEAD, title="Integrators, cheapest first; DEL errors in %", title_justify="left"
     )
     table.add_column("integrator", no_wrap=True, vertical="bottom")
     for heading in ("evals per s", "wall ms per s", "NRMSE median", "NRMSE worst"):
-        table.add_column(heading, justify="right", max_width=12)
+        table.add_column(heading.replace(" ", "\n"), justify="right")
     for heading in groups:
-        table.add_column(heading, justify="right", max_width=11)
-    table.add_column("verdict", no_wrap=True)
+        table.add_column(heading.replace(" ", "\n"), justify="right")
+    table.add_column("DEL\nerror", no_wrap=True)
     for summary in summaries:
         wall_time = summary.wall_time_per_second
         table.add_row(
@@ -106,7 +107,7 @@ def _verdict(summary: Any) -> str:
     if summary.worst_del_error is None:
         return "not compared"
     met = [level for level in LEVELS if summary.worst_del_error.size <= level]
-    return f"[green]DEL ≤ {format_percent(min(met))}[/]" if met else f"DEL > {format_percent(max(LEVELS))}"
+    return f"[green]≤ {format_percent(min(met))}[/]" if met else f"> {format_percent(max(LEVELS))}"
 
 
 def print_turbine(name: str, winds: Sequence[float], pitch_deg: float, console: Console) -> None:
@@ -134,7 +135,7 @@ def _plain_table(title: str, *headings: str) -> Table:
     table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left")
     table.add_column(headings[0])
     for heading in headings[1:]:
-        table.add_column(heading, justify="right")
+        table.add_column(heading.replace(" (", "\n("), justify="right")
     return table
 
 

@@ -45,6 +45,7 @@ def build_world(monkeypatch: Any) -> World:
             **{"radius": 63.0, "g_ratio": 97.0},
             **{"t_h": 88.0, "tower_to_shaft": 2.0, "overhang": -5.0, "sin_tilt": 0.0},
         },
+        kernel_data=lambda pitch: None,
         operating_point=lambda speed, *shears, pitch: np.full(len(STATE_NAMES), 0.1 * speed),
     )
 

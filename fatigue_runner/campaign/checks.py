@@ -34,6 +34,14 @@ def load_turbine(campaign: Campaign, source: Source) -> Any:
         raise InputError(f"{source.where(('turbine',))}: {error}") from None
 
 
+def check_pitch(campaign: Campaign, turbine: Any, source: Source) -> None:
+    """Raise InputError, with the line, for a pitch outside the aerodynamic tables."""
+    try:
+        turbine.kernel_data(float(np.deg2rad(campaign.pitch)))
+    except InputError as error:
+        raise InputError(f"{source.where(('pitch',))}: {error}") from None
+
+
 def check_integrators(campaign: Campaign, turbine: Any, source: Source) -> None:
     """Raise InputError for an unknown method and for a step above its stability limit on this turbine."""
     from fatigue_runner import integrators

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,7 @@ from fatigue_runner.campaign.source import Source, read_source
 from fatigue_runner.campaign.spec import Campaign, parse_campaign
 from fatigue_runner.campaign.store import Store
 
-# Winds per block: two widths of the lane kernel, so that a block costs seconds at most, which is what Ctrl-C
-# can lose.
+# Winds per block: the width of the lane kernel. A block is what progress counts in and what Ctrl-C can lose.
 BLOCK_SIZE = 16
 
 
@@ -69,11 +68,19 @@ class Plan:
         return jobs
 
 
-def make_plan(campaign: str | Path | Mapping[str, Any]) -> Plan:
-    """Read, validate and expand a campaign file or mapping. Raises InputError with "file:line"."""
+def make_plan(
+    campaign: str | Path | Mapping[str, Any], say: Callable[[str], None] = lambda what: None
+) -> Plan:
+    """Read, validate and expand a campaign file or mapping. Raises InputError with "file:line".
+
+    say: told what is going on, since the first checks on a machine compile the kernels.
+    """
+    say("reading the campaign")
     source = read_source(campaign)
     spec = parse_campaign(source)
+    say("loading the kernels (the first run compiles them)")
     turbine = checks.load_turbine(spec, source)
+    checks.check_pitch(spec, turbine, source)
     checks.check_integrators(spec, turbine, source)
     winds = wind_cases(spec.wind, spec.duration, turbine, source)
     built = checks.build_winds(winds, spec, source)

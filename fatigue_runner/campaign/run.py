@@ -46,8 +46,7 @@ def run_campaign(
 
     started = time.perf_counter()
     with Progress(console) as progress:
-        progress.say("reading the campaign")
-        plan = make_plan(campaign)
+        plan = make_plan(campaign, progress.say)
         folder = Path(out) if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh)
         simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress)
@@ -63,6 +62,8 @@ def run_campaign(
 
 def _simulate(plan: Plan, store: Store, workers: int, dask: str | None, progress: Any) -> int:
     """Run the cases that are not finished; returns how many there were."""
+    from fatigue_runner import integrators
+
     facts = about(plan)
     text = resolved_yaml(plan)
     setup = Setup(
@@ -79,7 +80,7 @@ def _simulate(plan: Plan, store: Store, workers: int, dask: str | None, progress
         pending = sum(len(job.cases) for job in jobs)
         progress.begin(len(plan.cases), len(plan.cases) - pending)
         if jobs:
-            _warm_up(plan, progress)
+            integrators.warm_up()  # here, once, so that the workers load the kernels from the cache
         progress.say("running")
         for records in run_jobs(run_block, jobs, workers, dask):
             store.add(records)
@@ -92,14 +93,6 @@ def _simulate(plan: Plan, store: Store, workers: int, dask: str | None, progress
         ) from None
     finally:
         store.close()
-
-
-def _warm_up(plan: Plan, progress: Any) -> None:
-    """Compile the kernels here, once, so that the workers load them from the cache."""
-    from fatigue_runner import integrators
-
-    progress.say("compiling the kernels (first run only)")
-    integrators.warm_up()
 
 
 def _collect(plan: Plan, store: Store, simulated: int) -> Results:

@@ -1,0 +1,149 @@
+"""The house stays as it was drawn: imports point one way, and heavy libraries stay where they are needed."""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fatigue_runner
+
+PACKAGE = Path(fatigue_runner.__file__).parent
+
+# Plain results, names, errors: everyone may use them, and they use nothing but each other.
+FLOOR = {"errors", "channels", "trajectory", "accuracy", "compiled"}
+
+# Which rooms a room may import. A new room is one line here.
+MAY_IMPORT = {
+    "turbine": set(),
+    "wind": set(),
+    "fatigue": set(),
+    "logbook": set(),
+    "integrators": {"turbine", "wind"},
+    "corrector": {"turbine", "wind", "integrators"},
+    "report": {"fatigue", "logbook"},
+    "viewer": {"logbook", "turbine"},
+    "campaign": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "report"},
+    "benchmark": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "campaign", "report"},
+    "api": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "campaign"},
+    "cli": None,  # anything: it is the roof
+    "cli_tables": None,
+    "__init__": {"api"},
+    "__main__": {"cli"},
+}
+
+# A library that only some rooms may load.
+ONLY_IN = {
+    "torch": {"corrector"},
+    "rerun": {"viewer"},
+    "sympy": {"turbine"},
+    "matplotlib": {"report", "benchmark"},
+    "mcap": {"logbook"},
+    "joblib": {"campaign", "corrector", "benchmark"},
+    "typer": {"cli", "logbook", "viewer", "corrector", "benchmark"},
+}
+
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+def room_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def imports_of(path: Path) -> set[str]:
+    """Dotted names of all modules that a file imports, also inside functions, but for type checking only."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = []
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative imports hide where they point"
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+def rooms_imported(path: Path) -> set[str]:
+    dotted = [name.split(".") for name in imports_of(path) if name.split(".")[0] == "fatigue_runner"]
+    return {parts[1] for parts in dotted if len(parts) > 1 and is_room(parts[1])}
+
+
+def is_room(name: str) -> bool:
+    return (PACKAGE / name).is_dir() or (PACKAGE / f"{name}.py").is_file()
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_room_imports_only_the_rooms_below_it(path):
+    room = room_of(path)
+    imported = rooms_imported(path) - {room}
+    if room in FLOOR:
+        assert imported <= FLOOR
+        return
+    assert room in MAY_IMPORT, f"say in this test what the new room {room!r} may import"
+    allowed = MAY_IMPORT[room]
+    assert allowed is None or imported <= allowed | FLOOR
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_heavy_libraries_are_imported_in_their_rooms_only(path):
+    for name in imports_of(path):
+        rooms = ONLY_IN.get(name.split(".")[0])
+        assert rooms is None or room_of(path) in rooms, f"{name} belongs into {sorted(rooms or ())}"
+
+
+def test_the_directions_have_no_circle():
+    order: list[str] = []
+    left = {room: set(below or ()) for room, below in MAY_IMPORT.items() if below is not None}
+    left["cli"] = set()
+    while left:
+        free = [room for room, below in left.items() if below <= set(order)]
+        assert free, f"a circle among {sorted(left)}"
+        order += free
+        left = {room: below for room, below in left.items() if room not in free}
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Top-level modules that a new interpreter holds after the statement."""
+    code = (
+        f"{statement}\nimport json, sys\nprint(json.dumps(sorted({{m.split('.')[0] for m in sys.modules}})))"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(json.loads(result.stdout.splitlines()[-1]))
+
+
+HEAVY = {"torch", "rerun", "matplotlib", "numba", "scipy", "sympy", "pyarrow", "jinja2", "optuna"}
+
+
+def test_importing_the_package_loads_no_library_at_all():
+    loaded = loaded_by("import fatigue_runner")
+    assert not loaded & (HEAVY | {"numpy", "pydantic", "ruamel", "mcap", "joblib", "typer", "rich"})
+
+
+def test_the_command_line_starts_without_heavy_libraries():
+    assert not loaded_by("import fatigue_runner.cli") & (HEAVY | {"numpy", "pydantic", "mcap", "joblib"})
+
+
+def test_reading_a_campaign_file_needs_no_compiler_and_no_plots():
+    assert not loaded_by("import fatigue_runner.campaign.spec") & (HEAVY - {"scipy"})
+
+
+def test_the_api_loads_no_training_viewer_or_plots():
+    loaded = loaded_by(
+        "import fatigue_runner as fr\nfr.run_campaign, fr.simulate, fr.ConstantWind, fr.rainflow"
+    )
+    assert not loaded & {"torch", "rerun", "matplotlib", "sympy", "optuna"}
+
+
+def test_every_name_of_the_api_is_there_and_listed():
+    for name in fatigue_runner.__all__:
+        assert getattr(fatigue_runner, name) is not None
+        assert name in dir(fatigue_runner)
+    with pytest.raises(AttributeError, match="has no attribute 'simulat'"):
+        fatigue_runner.simulat  # noqa: B018
