@@ -60,13 +60,19 @@ def _print_head(console: Console, summary: LogSummary) -> None:
     for title, entries in (("run", summary.run), ("result", summary.result)):
         table = Table("", "", title=title, show_header=False, title_justify="left", box=None)
         for key, value in entries.items():
-            if value != "":
+            if value != "" and not _is_extreme(key):
                 table.add_row(escape(key), escape(value))
         if table.row_count:
             console.print(table)
     if summary.attachments:
         names = ", ".join(f"{name} ({size} bytes)" for name, size in summary.attachments.items())
         console.print(f"attached: {escape(names)}", soft_wrap=True)
+
+
+def _is_extreme(key: str) -> bool:
+    """Whether a campaign's result repeats what the table of extremes shows."""
+    kind, _, name = key.partition("_")
+    return kind in ("mean", "min", "max") and name in channels.BY_NAME
 
 
 def _print_acceptance(console: Console, summary: LogSummary) -> None:

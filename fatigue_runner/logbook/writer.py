@@ -82,10 +82,18 @@ class LogWriter:
             if self.path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, "")
             self._file = open_exclusively(self.part)
+        try:
+            self._write_preface(run or {}, attachments or {})
+        except BaseException:
+            with suppress(OSError):
+                self.part.unlink()
+            raise
+
+    def _write_preface(self, run: Mapping[str, Any], attachments: Mapping[str, bytes]) -> None:
         with self._writing():
             self._container = Container(self._file, library_name())
-            self._container.metadata("run", {"log_schema": SCHEMA_VERSION, **as_text(run or {})})
-            for name, data in (attachments or {}).items():
+            self._container.metadata("run", {"log_schema": SCHEMA_VERSION, **as_text(run)})
+            for name, data in attachments.items():
                 media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
                 self._container.attachment(Attachment(0, 0, name, media_type, bytes(data)))
             self._file.flush()
