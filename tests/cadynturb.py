@@ -57,8 +57,7 @@ def parameters(data: dict) -> dict[str, float]:
         "t_gfa": -s["tower_Ct1_1_1_3"], "t_gss": -s["tower_Ct1_2_2_3"],
         "t_ka": s["tower_K0_1_1"], "t_ks": s["tower_K0_2_2"], "t_da": s["tower_D0_1_1"], "t_ds": s["tower_D0_2_2"],
         "gravity": s["g"], "radius": s["Rrot"], "q_area": s["rho"] * s["Arot"] / 2,
-        "tg_k": 2.332287, "tg_w1": -1e30, "tg_w2": -1e30, "tg_a1": 0.0, "tg_w3": 1e30, "tg_a2": 0.0, "tg_ws": 0.0, "tg_w4": 1e30,
-        "tg_p": 0.0, "tg_t": 0.0,
+        "tg_k": 2.332287, "tg_a2": 0.0, "tg_ws": 0.0, "tg_t2": -1e9, "tg_p": 0.0, "tg_t": 1e9, "tg_e": 0.0,
     }  # fmt: skip
     total = out.pop("sum_fxey_fyex")
     # FEMBeam's Oe1_xy does not separate the two; with the modes' axes turned by the twist, A_fyex is second order: -tan^2

@@ -26,8 +26,12 @@ def free_turbine(**changes):
         "t_da": 0.0,
         "t_ds": 0.0,
         "q_area": 0.0,
-        "tg_w1": 1e30,
-        "tg_w2": 2e30,
+        "tg_k": 0.0,
+        "tg_a2": 0.0,
+        "tg_t2": -1e9,
+        "tg_p": 0.0,
+        "tg_t": 1e9,
+        "tg_e": 0.0,
     }
     p |= {"h_itt": 5e4, "n_ixx": 1e6, "n_iyy": 2e6, "n_y": 0.3, "b_kfe": 300.0}
     pitches = [-5.0, 10.0, 20.0]

@@ -8,7 +8,7 @@ import pytest
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import simulate_block
 from fatigue_runner.turbine import load_turbine
-from fatigue_runner.turbine.parameters import at_pitch, generator_law, read_turbine_file
+from fatigue_runner.turbine.parameters import at_pitch, read_turbine_file
 from fatigue_runner.wind import ConstantWind
 
 # OpenFAST 5.0, the same degrees of freedom, quasi-steady BEM, k = 0.0255764 N.m/rpm^2, pitch 0, 8 m/s: rotor speed [rpm], generator
@@ -116,20 +116,33 @@ def test_pitching_the_modes_keeps_masses_and_stiffness():
     assert turned["b_fy"] == pytest.approx(-p["b_fx"], rel=1e-12)
 
 
-def test_the_generator_law_is_continuous_and_reaches_rated_power():
-    law = generator_law(read_turbine_file("nrel5mw")["generator"])
-    edges = [law["tg_w2"], law["tg_w3"], law["tg_w4"]]
-    pieces = [
-        lambda w: law["tg_a1"] * (w - law["tg_w1"]),
-        lambda w: law["tg_k"] * w * w,
-        lambda w: law["tg_a2"] * (w - law["tg_ws"]),
-        lambda w: law["tg_p"] / w,
-    ]
-    for w, below, above in zip(edges, pieces[:-1], pieces[1:], strict=True):
-        assert below(w) == pytest.approx(above(w), rel=1e-9)
-    assert law["tg_w1"] < law["tg_w2"] < law["tg_w3"] < law["tg_w4"]
-    # TP-500-38060, table 7-2: 43 093.55 N.m at the rated 1 173.7 rpm
-    assert pieces[3](1173.7 * np.pi / 30) == pytest.approx(43093.55, rel=1e-4)
+def generator_torque(turbine, speeds_rpm):
+    """Through the load channels, so through the compiled law."""
+    states = np.repeat(turbine.operating_point(8.0)[None], len(speeds_rpm), axis=0)
+    states[:, 15] = np.asarray(speeds_rpm) * np.pi / 30
+    return turbine.loads(states, np.tile([8.0, 0.0, 0.0], (len(speeds_rpm), 1)))["generator_torque"]
+
+
+def test_the_generator_follows_the_regions_of_the_report():
+    # TP-500-38060, 7.2: k omega^2 in region 2, 43 093.55 N.m at the rated 1 173.7 rpm, constant power above
+    turbine = load_turbine("nrel5mw")
+    low, rated, high = generator_torque(turbine, [900.0, 1173.7, 1250.0])
+    assert low == pytest.approx(0.0255764 * 900**2, rel=1e-3)
+    assert rated == pytest.approx(43093.55, rel=0.01)
+    assert high * 1250 == pytest.approx(43093.55 * 1173.7, rel=2e-3)
+
+
+def test_the_generator_law_has_no_kink():
+    speeds = np.linspace(800, 1300, 20001)
+    slope = np.diff(generator_torque(load_turbine("nrel5mw"), speeds)) / np.diff(speeds)
+    # the slope falls from about 400 to -37 N.m/rpm at rated speed: nowhere at once
+    assert np.abs(np.diff(slope)).max() < 0.02 * np.ptp(slope)
+
+
+def test_the_papers_torque_is_k_omega_squared_everywhere():
+    speeds = np.array([100.0, 871.0, 1173.7, 2000.0])
+    torque = generator_torque(load_turbine("t2b1i1cg"), speeds)
+    np.testing.assert_allclose(torque, 2.332287 * (speeds * np.pi / 30) ** 2, rtol=1e-9)
 
 
 def test_look_ups_outside_the_table_are_clamped_and_counted():

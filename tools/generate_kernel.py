@@ -24,29 +24,24 @@ LANES = 16
 
 
 class Printer(PythonCodePrinter):
-    """Python source that numba compiles well: products instead of powers, conditional expressions."""
+    """Python source that numba compiles well: products instead of powers."""
 
-    def _print_Pow(self, expr, rational=False):  # noqa: N802
+    def _print_Pow(self, expr, rational=False):
         base, exponent = expr.as_base_exp()
         if exponent.is_Integer and 1 < abs(exponent) <= 4:
             product = "*".join([self.parenthesize(base, 50)] * abs(int(exponent)))
             return f"({product})" if exponent > 0 else f"(1.0/({product}))"
         if exponent == -1:
             return f"(1.0/{self.parenthesize(base, 50)})"
+        if exponent == sp.Rational(1, 2) and not base.is_number:
+            return f"math.sqrt({self._print(base)})"
         return repr(float(expr))
 
-    def _print_Rational(self, expr):  # noqa: N802
+    def _print_Rational(self, expr):
         return repr(float(expr))
 
-    def _print_Integer(self, expr):  # noqa: N802
+    def _print_Integer(self, expr):
         return f"{int(expr)}.0"
-
-    def _print_Piecewise(self, expr):  # noqa: N802
-        text = self._print(expr.args[-1].expr)
-        for piece in reversed(expr.args[:-1]):
-            condition = f"{self._print(piece.cond.lhs)} < {self._print(piece.cond.rhs)}"
-            text = f"({self._print(piece.expr)} if {condition} else {text})"
-        return text
 
 
 PRINT = Printer().doprint
@@ -148,7 +143,7 @@ def kernel(
     ]
     places = {c: i for i, c in enumerate(constants)}
     source = [
-        f"@njit(**FAST)",
+        "@njit(**FAST)",
         f"def {name}(x, wind, {''.join(f'{a}, ' for a in extra_inputs)}out, start, tables, cells, constants, scratch, row, clamped):",
         f'        """{doc}"""'.replace("        ", "    ", 1),
     ]

@@ -108,15 +108,12 @@ PARAMETERS = {
     "radius": "rotor radius R in the aerodynamic coefficients [m]",
     "q_area": "air density * rotor area / 2 [kg/m]",
     "tg_k": "generator torque in region 2: k omega^2 [N m s2/rad2]",
-    "tg_w1": "generator speed where torque begins (region 1.5) [rad/s]",
-    "tg_w2": "generator speed where region 2 begins [rad/s]",
-    "tg_a1": "slope of region 1.5 [N m s/rad]",
-    "tg_w3": "generator speed where region 2.5 begins [rad/s]",
     "tg_a2": "slope of region 2.5 [N m s/rad]",
     "tg_ws": "speed of zero torque of the region-2.5 line [rad/s]",
-    "tg_w4": "generator speed where region 3 begins [rad/s]",
+    "tg_t2": "added to the region-2.5 line [N m]",
     "tg_p": "generator power of region 3 (constant power) [W]",
-    "tg_t": "torque of region 3 (constant torque) [N m]",
+    "tg_t": "torque of region 3 (constant torque), added to power / speed [N m]",
+    "tg_e": "torque over which the regions blend [N m]",
 }
 P = {name: sp.Symbol(name, real=True) for name in PARAMETERS}
 
@@ -632,18 +629,16 @@ def aero_resultant(sheet: Sheet, aero: Aerodynamics) -> tuple[sp.Matrix, sp.Matr
 
 
 def generator_torque(sheet: Sheet) -> sp.Expr:
-    """Region law of NREL/TP-500-38060, 7.2; every threshold is a parameter, region 2 alone is k omega^2."""
-    w = STATE[15]
-    return sheet.let(
-        "torque_gen",
-        sp.Piecewise(
-            (0, w < P["tg_w1"]),
-            (P["tg_a1"] * (w - P["tg_w1"]), w < P["tg_w2"]),
-            (P["tg_k"] * w * w, w < P["tg_w3"]),
-            (P["tg_a2"] * (w - P["tg_ws"]), w < P["tg_w4"]),
-            (P["tg_t"] + P["tg_p"] / w, True),
-        ),
-    )
+    """Regions 2, 2.5 and 3 of NREL/TP-500-38060, 7.2: min(max(k omega^2, line), power / omega), with smooth corners.
+
+    A kink where a trajectory passes costs every method its order (docs/decisions/0002).
+    """
+    w, blend = STATE[15], sheet.constant(P["tg_e"] ** 2)
+    optimal = sheet.let("torque_optimal", P["tg_k"] * w * w)
+    rise = sheet.let("torque_rise", P["tg_a2"] * (w - P["tg_ws"]) + P["tg_t2"] - optimal)
+    below = sheet.let("torque_below", optimal + (rise + sp.sqrt(rise * rise + blend)) / 2)
+    excess = sheet.let("torque_excess", below - P["tg_t"] - P["tg_p"] / w)
+    return sheet.let("torque_gen", below - (excess + sp.sqrt(excess * excess + blend)) / 2)
 
 
 def shaft_torque(sheet: Sheet) -> sp.Expr:

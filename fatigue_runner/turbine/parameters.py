@@ -27,8 +27,7 @@ _INTEGRALS = {
     "b_rsff": ("r", "S_ff"), "b_rsfe": ("r", "S_fe"), "b_rsee": ("r", "S_ee"),
 }  # fmt: skip
 
-_FAST = 1e30  # a generator speed that is never reached [rad/s]
-_RPM = np.pi / 30.0
+_FAR = 1e9  # a torque that is never reached [N m]
 
 
 def read_turbine_file(name: str) -> dict[str, Any]:
@@ -145,32 +144,23 @@ def _tower(tower: TowerModes) -> dict[str, float]:
 
 
 def generator_law(generator: Mapping[str, Any]) -> dict[str, float]:
-    """Thresholds of the torque law [rad/s, N m, W]; `law: optimal` is k omega^2 at every speed."""
+    """Parameters of the torque law [rad/s, N m, W]; `law: optimal` is k omega^2 at every speed."""
     gain = generator["optimal_gain"]
     law = generator["law"]
-    never = {
-        "tg_w1": -_FAST,
-        "tg_w2": -_FAST,
-        "tg_a1": 0.0,
-        "tg_w3": _FAST,
-        "tg_a2": 0.0,
-        "tg_ws": 0.0,
-        "tg_w4": _FAST,
-    }
     if law == "optimal":
-        return {"tg_k": gain, **never, "tg_p": 0.0, "tg_t": 0.0}
+        # the line and the power limit are out of reach, but not so far that rounding swallows the torque
+        return {"tg_k": gain, "tg_a2": 0.0, "tg_ws": 0.0, "tg_t2": -_FAR, "tg_p": 0.0, "tg_t": _FAR, "tg_e": 0.0}
     if law != "regions":
         raise InputError(f"generator: unknown law {law!r}{did_you_mean(str(law), ('optimal', 'regions'))}")
     r = generator["regions"]
-    w1, w2, w4 = (r[f"{k}_speed_rpm"] * _RPM for k in ("cut_in", "region_2", "region_3"))
-    sync = w4 / (1 + r["slip_percent"] / 100)
-    # region 2.5 is a line from zero torque at `sync` through the rated torque at region 3's first speed
-    slope = r["rated_mechanical_power"] / w4 / (w4 - sync)
-    # it leaves region 2 where gain w^2 = slope (w - sync), the lower root
-    w3 = (slope - np.sqrt(slope * (slope - 4 * gain * sync))) / (2 * gain)
+    start = r["region_3_speed_rpm"] * np.pi / 30
+    synchronous = start / (1 + r["slip_percent"] / 100)
+    power = r["rated_mechanical_power"]
+    # region 2.5 is a line from zero torque at the synchronous speed through the rated power at region 3's first speed
+    slope = power / start / (start - synchronous)
     return {
-        "tg_k": gain, "tg_w1": w1, "tg_w2": w2, "tg_a1": gain * w2**2 / (w2 - w1), "tg_w3": w3,
-        "tg_a2": slope, "tg_ws": sync, "tg_w4": w4, "tg_p": r["rated_mechanical_power"], "tg_t": 0.0,
+        "tg_k": gain, "tg_a2": slope, "tg_ws": synchronous, "tg_t2": 0.0, "tg_p": power, "tg_t": 0.0,
+        "tg_e": r["blend_torque"],
     }  # fmt: skip
 
 
