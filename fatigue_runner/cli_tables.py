@@ -34,9 +34,16 @@ def print_results(results: Results, console: Console) -> None:
         console.print(f"... and {len(results.lost) - 10} more; see the column `status` of results.csv")
     console.print(
         f"{len(results)} cases, {results.simulated} of them simulated now, in {results.wall_time:.1f} s; "
-        f"report: {escape(str(results.out / 'report.html'))}",
+        f"table: {escape(str(results.out / 'results.csv'))}",
         soft_wrap=True,
     )
+    if results.report_error:
+        console.print(f"[red]no report:[/] {escape(results.report_error)}", soft_wrap=True)
+        console.print(
+            f"`fatigue-runner report {escape(str(results.out))} --debug` tries again", soft_wrap=True
+        )
+    else:
+        console.print(f"report: {escape(str(results.out / 'report.html'))}", soft_wrap=True)
 
 
 def _table(results: Results, summaries: Any, console: Console) -> Any:

@@ -210,11 +210,21 @@ def test_ctrl_c_ends_with_130_leaves_no_worker_and_the_same_command_goes_on(tmp_
     assert process.returncode == 130
     assert "cases are finished; the same command runs the rest" in errors
     assert "Traceback" not in errors
-    with pytest.raises(ProcessLookupError):
-        os.killpg(process.pid, 0)
+    assert group_is_gone(process.pid), "a worker outlived the campaign"
     finished = journal.read_bytes().count(b"\n")
     assert finished > 0
     assert make_and_count(campaign, tmp_path / "out") == finished
+
+
+def group_is_gone(group: int) -> bool:
+    """Whether all processes of a group end within seconds; joblib's resource tracker ends after its parent."""
+    for _ in range(100):
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.1)
+    return False
 
 
 def make_and_count(campaign: Path, out: Path) -> int:

@@ -214,6 +214,36 @@ def test_a_diverged_case_is_reported_with_its_time_and_the_rest_finishes(world, 
     assert run_campaign(campaign, out).simulated == 0  # it would diverge again
 
 
+def test_a_state_that_is_no_number_is_a_failure_with_its_time_never_a_figure(
+    world, campaign, out, monkeypatch
+):
+    from fatigue_runner import integrators
+
+    simulate = integrators.simulate_block
+
+    def poisoned(turbine, method, *args, **kwargs):
+        trajectories = simulate(turbine, method, *args, **kwargs)
+        if method == "rk4":
+            trajectories[1].state[200:, 3] = np.nan
+        return trajectories
+
+    monkeypatch.setattr(integrators, "simulate_block", poisoned)
+    (row,) = run_campaign(campaign, out).lost
+    assert (row["case_id"], row["status"]) == ("v08.00_rk4_100ms", "failed")
+    assert "no number from 4 s on" in row["error_message"]
+    assert row["del_blade1_root_flapwise_moment_m3"] is None
+
+
+def test_a_report_that_fails_costs_neither_the_results_nor_a_traceback(world, campaign, out, monkeypatch):
+    def broken(folder):
+        raise ValueError("no ink")
+
+    monkeypatch.setattr("fatigue_runner.report.write_report", broken)
+    results = run_campaign(campaign, out)
+    assert len(results) == 12 and (out / "results.csv").is_file()
+    assert (results.exit_code, results.report_error) == (1, "ValueError: no ink")
+
+
 def test_nothing_is_compared_with_a_reference_that_diverged(world, campaign, out):
     world.diverging["rk7", 8.0] = 4.0
     results = run_campaign(campaign, out)

@@ -79,6 +79,17 @@ def test_a_diverged_case_is_listed_with_its_time_and_the_exit_code_is_1(world, c
     assert "1 of 3 lost" in words(out)
 
 
+def test_a_report_that_fails_is_told_after_the_table(world, call, tmp_path, monkeypatch):
+    def broken(folder):
+        raise ValueError("no ink")
+
+    monkeypatch.setattr("fatigue_runner.report.write_report", broken)
+    code, out, _ = call("run", write_campaign(tmp_path))
+    assert code == 1
+    assert "rk4 100 ms" in out
+    assert "no report: ValueError: no ink `fatigue-runner report runs/toy --debug` tries again" in words(out)
+
+
 def test_wrong_input_is_one_sentence_without_a_traceback_and_the_exit_code_is_2(world, call, tmp_path):
     code, out, err = call("run", write_campaign(tmp_path, CAMPAIGN.replace("speeds", "sped")))
     assert code == 2

@@ -11,6 +11,7 @@ import numpy as np
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.results import columns, fatigue_keys, known
 from fatigue_runner.campaign.spec import Campaign
+from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.trajectory import Trajectory
 
 # The columns that say what was simulated; a log carries them too.
@@ -47,6 +48,10 @@ def evaluate(trajectory: Trajectory, campaign: Campaign) -> Evaluated:
     """Count every fatigue channel once, all exponents on the same cycles; a diverged case has no loads."""
     from fatigue_runner.fatigue import channel_fatigue
 
+    finite = np.isfinite(trajectory.state).all(axis=1)
+    if not finite.all():
+        when = trajectory.time[np.argmin(finite)]
+        raise FatigueRunnerError(f"the state is no number from {when:g} s on, and no divergence was reported")
     kept = discarded(trajectory, campaign.discard)
     if trajectory.diverged_at is not None:
         return Evaluated(trajectory, kept, {})

@@ -68,6 +68,7 @@ class Results:
     simulated: int = 0
     kept: int = 0
     wall_time: float = 0.0
+    report_error: str = ""
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -90,8 +91,8 @@ class Results:
 
     @property
     def exit_code(self) -> int:
-        """0 where every case is done, 1 where some diverged or failed."""
-        return 1 if self.lost else 0
+        """0 where every case is done, 1 where some diverged or failed, or the report did."""
+        return 1 if self.lost or self.report_error else 0
 
     def write(self) -> None:
         """Write `results.csv`, and `results.parquet` where pyarrow is installed, into the run folder."""

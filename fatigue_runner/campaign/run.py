@@ -53,11 +53,19 @@ def run_campaign(
         results = _collect(plan, store, simulated)
         results.write()
         progress.say("writing the report")
-        from fatigue_runner.report import write_report
-
-        write_report(folder)
+        _write_report(results)
     results.wall_time = time.perf_counter() - started
     return results
+
+
+def _write_report(results: Results) -> None:
+    """Write report.html; what goes wrong there is told, and costs neither the results nor their table."""
+    from fatigue_runner.report import write_report
+
+    try:
+        write_report(results.out)
+    except Exception as error:
+        results.report_error = f"{type(error).__name__}: {error}"
 
 
 def _simulate(plan: Plan, store: Store, workers: int, dask: str | None, progress: Any) -> int:
