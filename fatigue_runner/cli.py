@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 # Command groups of other rooms, loaded when they are called: (module, its Typer app).
-MOUNTED = {"logs": ("fatigue_runner.logbook.commands", "app")}
+MOUNTED = {
+    "logs": ("fatigue_runner.logbook.commands", "app"),
+    "view": ("fatigue_runner.viewer.commands", "app"),
+}
 
 
 class _LazyGroup(TyperGroup):

@@ -42,7 +42,7 @@ ONLY_IN = {
     "rerun": {"viewer"},
     "sympy": {"turbine"},
     "matplotlib": {"report", "benchmark"},
-    "mcap": {"logbook"},
+    "mcap": {"logbook", "benchmark"},
     "joblib": {"campaign", "corrector", "benchmark"},
     "typer": {"cli", "logbook", "viewer", "corrector", "benchmark"},
 }

@@ -177,7 +177,8 @@ def _finish(
         "wind": wind.name,
         **{name: "" if row[name] is None else str(row[name]) for name in DESCRIPTION},
     }
-    result = {name: str(value) for name, value in row.items() if value is not None}
+    said = {"case_id", *DESCRIPTION}
+    result = {name: str(value) for name, value in row.items() if value is not None and name not in said}
     error = None
     if reference is not None and not case.integration.is_reference and trajectory.diverged_at is None:
         error = scaled_error(trajectory, reference.whole)

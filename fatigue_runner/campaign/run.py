@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import platform
 import time
-from collections.abc import Mapping
-from importlib import metadata
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fatigue_runner.campaign.about import about
 from fatigue_runner.campaign.block import Setup, run_block
 from fatigue_runner.campaign.plan import Plan, make_plan, resolved_yaml
 from fatigue_runner.campaign.pool import run_jobs
@@ -18,6 +18,10 @@ from fatigue_runner.errors import FatigueRunnerError
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+
+# (run folder, cases in all, ids of the cases of each job, workers) -> the context in which the cases run
+Watch = Callable[[Path, int, list[list[str]], int], AbstractContextManager[Any]]
 
 
 class CampaignInterrupted(FatigueRunnerError):
@@ -34,13 +38,15 @@ def run_campaign(
     fresh: bool = False,
     dask: str | None = None,
     console: Console | None = None,
+    watch: Watch | None = None,
 ) -> Results:
     """Run a campaign file (or a mapping with its keys) and return the results table.
 
     out: run folder, default `runs/<name>`; finished cases found there are kept, unless `fresh`. workers:
     processes, default as the campaign says; dask: address of a scheduler instead. console: where progress is
-    shown; None shows nothing. Raises InputError before anything is written where the campaign or the folder
-    is wrong, and CampaignInterrupted on Ctrl-C.
+    shown; None shows nothing. watch: called with the run folder, the number of cases, the ids of the cases of
+    each job and the number of workers; the cases run inside the context that it returns. Raises InputError before
+    anything is written where the campaign or the folder is wrong, and CampaignInterrupted on Ctrl-C.
     """
     from fatigue_runner.campaign.progress import Progress
 
@@ -49,7 +55,7 @@ def run_campaign(
         plan = make_plan(campaign, progress.say)
         folder = Path(out) if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh)
-        simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress)
+        simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress, watch)
         results = _collect(plan, store, simulated)
         results.write()
         progress.say("writing the report")
@@ -68,11 +74,13 @@ def _write_report(results: Results) -> None:
         results.report_error = f"{type(error).__name__}: {error}"
 
 
-def _simulate(plan: Plan, store: Store, workers: int, dask: str | None, progress: Any) -> int:
+def _simulate(
+    plan: Plan, store: Store, workers: int, dask: str | None, progress: Any, watch: Watch | None = None
+) -> int:
     """Run the cases that are not finished; returns how many there were."""
     from fatigue_runner import integrators
 
-    facts = about(plan)
+    facts = about(plan.campaign.name, plan.turbine)
     text = resolved_yaml(plan)
     setup = Setup(
         plan.campaign,
@@ -90,9 +98,11 @@ def _simulate(plan: Plan, store: Store, workers: int, dask: str | None, progress
         if jobs:
             integrators.warm_up()  # here, once, so that the workers load the kernels from the cache
         progress.say("running")
-        for records in run_jobs(run_block, jobs, workers, dask):
-            store.add(records)
-            progress.advance(records)
+        ids = [[case.id for case in job.cases] for job in jobs]
+        with watch(store.out, len(plan.cases), ids, workers) if watch else nullcontext():
+            for records in run_jobs(run_block, jobs, workers, dask):
+                store.add(records)
+                progress.advance(records)
         return pending
     except KeyboardInterrupt:
         done = sum(store.finished(case, plan.campaign.log.enabled) is not None for case in plan.cases)
@@ -112,23 +122,3 @@ def _collect(plan: Plan, store: Store, simulated: int) -> Results:
         simulated=simulated,
         kept=len(plan.cases) - simulated,
     )
-
-
-def about(plan: Plan) -> dict[str, str]:
-    """What ran on what: the facts that logs and the run folder carry."""
-    names = ("fatigue-runner", "numpy", "numba", "scipy")
-    versions = [f"{name} {_version(name)}" for name in names]
-    return {
-        "campaign": plan.campaign.name,
-        "turbine": plan.turbine.name,
-        "turbine_hash": plan.turbine.hash,
-        "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
-        "machine": f"{platform.machine()}, {platform.system()}",
-    }
-
-
-def _version(name: str) -> str:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
