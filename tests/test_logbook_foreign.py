@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -130,3 +131,15 @@ def test_a_field_of_a_later_version_is_kept_or_ignored_but_never_mistaken(tmp_pa
         path = write_log(tmp_path / "a.mcap", trajectory)
     log = read_log(path)
     assert differing(log, trajectory) == []
+
+
+def test_the_ten_lines_of_python_in_the_manual_work(tmp_path, monkeypatch, capsys):
+    manual = (Path(__file__).parents[1] / "docs" / "logs.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"```python\n(.*?)```", manual, flags=re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    write_log("case.mcap", example(3), RUN)
+    for block in blocks:
+        exec(block.replace("runs/quickstart/logs/<case id>.mcap", "case.mcap"), {})
+    assert len(blocks) == 2 and max(block.count("\n") for block in blocks) <= 10
+    flap = example(3).loads["blade1_root_flapwise_moment"]
+    assert str(flap[2]) in capsys.readouterr().out

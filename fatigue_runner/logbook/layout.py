@@ -9,6 +9,7 @@ rows.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -110,3 +111,9 @@ class RowLayout:
             if not np.array_equal(rows[t.key]["_sequence"][skip:], expected):
                 return None
         return rows
+
+
+@lru_cache(maxsize=64)
+def layout_for(topics: tuple[Topic, ...]) -> RowLayout:
+    """The layout of rows with these topics; a campaign's logs share one, and making it takes as long as reading one."""
+    return RowLayout(topics)

@@ -18,7 +18,7 @@ from fatigue_runner.logbook.contents import Contents, read_contents
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.files import read_bytes
 from fatigue_runner.logbook.generic import Tables
-from fatigue_runner.logbook.layout import RowLayout
+from fatigue_runner.logbook.layout import RowLayout, layout_for
 from fatigue_runner.logbook.records import Damage, open_chunk
 from fatigue_runner.logbook.schema import BY_TOPIC, TOPICS
 from fatigue_runner.trajectory import Trajectory
@@ -60,7 +60,7 @@ def row_layout(contents: Contents) -> RowLayout | None:
             return None
         raise
     order = list(TOPICS)
-    return RowLayout(sorted(topics, key=lambda t: order.index(t.key)))
+    return layout_for(tuple(sorted(topics, key=lambda t: order.index(t.key))))
 
 
 def chunk_tables(layout: RowLayout, rows: np.ndarray, first_row: int) -> Tables:

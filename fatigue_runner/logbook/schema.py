@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 
 from google.protobuf import descriptor_pb2
 from google.protobuf.message import DecodeError
@@ -134,6 +134,7 @@ def fields_in(data: bytes, name: str) -> tuple[Field, ...] | None:
     return None
 
 
+@lru_cache(maxsize=256)
 def known_topic(topic_name: str, schema_name: str, data: bytes) -> Topic | None:
     """The topic that a log of ours declares, with its fields; None for one of a later version.
 

@@ -25,7 +25,7 @@ from fatigue_runner.logbook.compression import compressor
 from fatigue_runner.logbook.container import Container, as_text, library_name
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.files import open_exclusively, part_of, publish, write_errors
-from fatigue_runner.logbook.layout import RowLayout
+from fatigue_runner.logbook.layout import RowLayout, layout_for
 from fatigue_runner.logbook.schema import SCHEMA_VERSION, descriptor_set, select_topics
 from fatigue_runner.trajectory import Trajectory
 
@@ -128,7 +128,7 @@ class LogWriter:
         extra = {"reference_error": reference_error, "clamped_lookups": clamped_lookups}
         values = columns(block, extra, self.rows)
         if self._layout is None:
-            self._begin(RowLayout(topics_of(values, self._topic_keys, self._channels)))
+            self._begin(layout_for(topics_of(values, self._topic_keys, self._channels)))
         self._refuse_missing(values)
         with self._writing():
             self._write_rows(values, log_time)
@@ -228,7 +228,7 @@ class LogWriter:
         if self._file.closed:
             return
         if self._layout is None:
-            self._begin(RowLayout(select_topics(self._topic_keys)))
+            self._begin(layout_for(select_topics(self._topic_keys)))
         with self._writing():
             self._close_chunk()
             self._container.metadata("result", self._full_result())
