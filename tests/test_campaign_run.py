@@ -437,3 +437,13 @@ def test_a_shear_exponent_becomes_the_linear_shear_of_this_rotor(world, tmp_path
     row = run_campaign(write_campaign(tmp_path, text), out).rows[0]
     assert row["vertical_shear"] == pytest.approx(0.2 * 63 / 90)
     assert row["case_id"] == "v08.00_kv0.14_rk7_10ms"
+
+
+def test_dask_without_its_package_is_refused_with_the_pip_command(world, campaign, out):
+    import importlib.util
+
+    if importlib.util.find_spec("distributed") is not None:
+        pytest.skip("distributed is installed")
+    with pytest.raises(InputError, match="pip install distributed"):
+        run_campaign(campaign, out, dask="tcp://localhost:8786")
+    assert not out.exists()

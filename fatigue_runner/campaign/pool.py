@@ -15,6 +15,20 @@ T = TypeVar("T")
 J = TypeVar("J")
 
 
+def connect(dask: str) -> None:
+    """Connect to a dask scheduler, `tcp://host:8786`. Raises InputError where none answers, or without the package."""
+    try:
+        import distributed
+    except ImportError:
+        raise InputError("--dask needs the package `distributed`: pip install distributed") from None
+    try:
+        distributed.Client(dask, timeout=10, set_as_default=True)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no dask scheduler answers at {dask} ({error}); start one with `dask scheduler`"
+        ) from None
+
+
 def run_jobs(
     function: Callable[[J], T], jobs: Sequence[J], workers: int, dask: str | None = None
 ) -> Iterator[T]:
@@ -37,23 +51,12 @@ def run_jobs(
 
 
 def _backend(joblib: Any, workers: int, dask: str | None) -> AbstractContextManager[Any]:
-    if dask is None:
-        if workers == 1:
-            return joblib.parallel_config("sequential", n_jobs=1)
-        # One thread per worker: the kernels are single-threaded, and BLAS must not take the other workers'
-        # cores.
-        return joblib.parallel_config("loky", n_jobs=workers, inner_max_num_threads=1)
-    try:
-        import distributed
-    except ImportError:
-        raise InputError("--dask needs the package `distributed`: pip install distributed") from None
-    try:
-        distributed.Client(dask, timeout=10, set_as_default=True)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"no dask scheduler answers at {dask} ({error}); start one with `dask scheduler`"
-        ) from None
-    return joblib.parallel_config("dask")
+    if dask is not None:
+        return joblib.parallel_config("dask")
+    if workers == 1:
+        return joblib.parallel_config("sequential", n_jobs=1)
+    # One thread per worker: the kernels are single-threaded, and BLAS must not take the other workers' cores.
+    return joblib.parallel_config("loky", n_jobs=workers, inner_max_num_threads=1)
 
 
 def _guarded(function: Callable[[J], T], job: J) -> T:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from fatigue_runner.campaign.about import about
 from fatigue_runner.campaign.block import Setup, run_block
 from fatigue_runner.campaign.plan import Plan, make_plan, resolved_yaml
-from fatigue_runner.campaign.pool import run_jobs
+from fatigue_runner.campaign.pool import connect, run_jobs
 from fatigue_runner.campaign.results import Results, columns
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.errors import FatigueRunnerError
@@ -55,6 +55,8 @@ def run_campaign(
         plan = make_plan(campaign, progress.say)
         folder = Path(out) if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh)
+        if dask is not None:
+            connect(dask)
         simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress, watch)
         results = _collect(plan, store, simulated)
         results.write()
