@@ -37,6 +37,11 @@ class Screen:
             before = now
         return before
 
+    def soon(self) -> np.ndarray:
+        """The picture in a while, for a view that never stands still."""
+        time.sleep(2.0)
+        return self._shot()
+
     def _shot(self) -> np.ndarray:
         from matplotlib.image import imread
 

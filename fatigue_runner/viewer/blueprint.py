@@ -36,6 +36,46 @@ def first_screen(cases: Sequence[Viewed], playing: bool = True) -> rrb.Blueprint
     )
 
 
+def live_screen(cases: Sequence[Viewed], paced: bool) -> rrb.Blueprint:
+    """The campaign as it fills, beside the case that is shown; only the campaign before there is one."""
+    campaign = [
+        rrb.TextDocumentView(origin="campaign/cases", name="Campaign"),
+        rrb.Spatial2DView(origin="campaign/chart", name="DEL over wind speed", background=_BACKGROUND),
+    ]
+    if not cases:
+        screen: rrb.Container = rrb.Horizontal(*campaign, column_shares=[2, 3])
+    else:
+        plots = [
+            _plot(
+                "Blade root flapwise moment [MN·m]",
+                cases,
+                _blades("load", "root_flapwise_moment", cases),
+                live=paced,
+            ),
+            _plot(
+                "Tower-base fore-aft moment [MN·m]", cases, ["load/tower_base_fore_aft_moment"], live=paced
+            ),
+        ]
+        screen = rrb.Horizontal(
+            rrb.Vertical(scene_view(cases), rrb.Horizontal(*plots), row_shares=[3, 2]),
+            rrb.Vertical(*campaign),
+            column_shares=[3, 2],
+        )
+    return rrb.Blueprint(
+        screen,
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=TIMELINE,
+            play_state="following" if paced else "playing",
+            loop_mode="all",
+        ),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
 def overview(cases: Sequence[Viewed]) -> rrb.Container:
     """Scene and the few plots that say how the run goes: beside one turbine, below a row of them."""
     plots = [
@@ -75,24 +115,29 @@ def scene_view(cases: Sequence[Viewed]) -> rrb.Spatial3DView:
     )
 
 
-def _time_axis(cases: Sequence[Viewed]) -> rrb.TimeAxis:
-    """A short log whole, of a long one a minute around the cursor."""
+def _time_axis(cases: Sequence[Viewed], live: bool) -> rrb.TimeAxis:
+    """A short log whole, of a long one a minute around the cursor, of one that is being played the last seconds."""
     last = max(float(case.log.time[-1]) for case in cases)
-    if last <= LONGEST_WHOLE:
+    if last <= LONGEST_WHOLE and not live:
         ends = [rr.TimeRangeBoundary.absolute(seconds=t) for t in (0.0, last)]
     else:
-        ends = [rr.TimeRangeBoundary.cursor_relative(seconds=t) for t in (-30.0, 30.0)]
+        window = (-30.0, 2.0) if live else (-30.0, 30.0)
+        ends = [rr.TimeRangeBoundary.cursor_relative(seconds=t) for t in window]
     return rrb.TimeAxis(view_range=rr.TimeRange(*ends))
 
 
 def _plot(
-    name: str, cases: Sequence[Viewed], paths: Sequence[str], y: tuple[float, float] | None = None
+    name: str,
+    cases: Sequence[Viewed],
+    paths: Sequence[str],
+    y: tuple[float, float] | None = None,
+    live: bool = False,
 ) -> rrb.TimeSeriesView:
     return rrb.TimeSeriesView(
         origin="/",
         name=name,
         contents=[f"/plots/{path}/{case.key}" for path in paths for case in cases],
-        axis_x=_time_axis(cases),
+        axis_x=_time_axis(cases, live),
         axis_y=rrb.ScalarAxis(range=y) if y else None,
         plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.RightTop),
     )

@@ -99,7 +99,12 @@ def read_cases(paths: Sequence[Path], turbine: str | None = None) -> list[Viewed
     A damaged log is shown up to where it is good. Raises InputError where a file is no log of a turbine, has no states,
     or was made with another turbine than the one that would be drawn.
     """
-    logs = [(path, _readable(path)) for path in paths]
+    return as_viewed([(path, _readable(path)) for path in paths], turbine)
+
+
+def as_viewed(logs: Sequence[tuple[Path, Log]], turbine: str | None = None) -> list[Viewed]:
+    """Places, names and colours for logs that were read from these files, the reference first."""
+    logs = list(logs)
     logs.sort(key=lambda item: not _is_reference(item[1]))
     viewed: list[Viewed] = []
     others = 0

@@ -1,0 +1,277 @@
+"""A campaign that is being watched: the run is the same to the bit, and nothing that happens to the viewer stops or holds it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from viewer_example import motion, write
+
+from fatigue_runner.errors import InputError
+from fatigue_runner.logbook import LogWriter
+from fatigue_runner.viewer import bridge, live, window
+from fatigue_runner.viewer.live import Watched
+from fatigue_runner.viewer.overview import Overview, chart, ticks
+
+
+def record(case_id: str, **row: object) -> dict:
+    return {"row": {"case_id": case_id, "status": "done", "method": "heun", "step": 0.01, **row}}
+
+
+def append(folder: Path, *records: dict, end: str = "\n") -> None:
+    with (folder / "cases.jsonl").open("a") as file:
+        file.write("\n".join(json.dumps(r) for r in records) + end)
+
+
+# --- the campaign as it fills
+
+
+def test_counts_follow_the_records_as_blocks_of_cases_come_in(tmp_path):
+    view = Overview(tmp_path, 7, [["a", "b"], ["c", "d"], ["e", "f"]], workers=1)
+    assert not view.update(), "no record yet"
+    assert view.counts() == {"done": 0, "diverged": 0, "failed": 0, "running": 2, "waiting": 5}
+    append(tmp_path, record("a"), record("b", status="diverged"))
+    assert view.update()
+    assert view.counts() == {"done": 1, "diverged": 1, "failed": 0, "running": 2, "waiting": 3}
+    append(tmp_path, record("c", status="failed"))
+    view.update()
+    assert view.counts()["running"] == 1
+    assert not view.update(), "nothing new"
+
+
+def test_half_a_record_waits_for_its_other_half(tmp_path):
+    view = Overview(tmp_path, 2)
+    whole = json.dumps(record("a"))
+    (tmp_path / "cases.jsonl").write_text(whole[:20])
+    view.update()
+    assert not view.rows
+    (tmp_path / "cases.jsonl").write_text(whole + "\n")
+    view.update()
+    assert list(view.rows) == ["a"]
+
+
+def test_campaign_that_is_begun_anew_is_counted_anew(tmp_path):
+    view = Overview(tmp_path, 2)
+    append(tmp_path, record("a"), record("b"))
+    view.update()
+    (tmp_path / "cases.jsonl").write_text(json.dumps(record("c")) + "\n")
+    view.update()
+    assert list(view.rows) == ["c"]
+
+
+def test_chart_has_a_point_per_case_that_is_done_at_its_wind_and_load(tmp_path):
+    view = Overview(tmp_path, 9)
+    name = "del_blade1_root_flapwise_moment_m10"
+    append(
+        tmp_path,
+        *(record(f"a{v}", wind_speed=v, **{name: 1e5 * v, "del_error_x_m10": 0.1}) for v in (5, 10, 15)),
+        record("lost", status="diverged", wind_speed=7.0),
+        record("b", method="rk4", wind_speed=10, **{name: 1e6}),
+    )
+    view.update()
+    assert view.figure() == name
+    drawing = chart(view)
+    assert {key: len(points) for key, (points, _) in drawing.series.items()} == {
+        "heun, 10 ms": 3,
+        "rk4, 10 ms": 1,
+    }
+    points = drawing.series["heun, 10 ms"][0]
+    # equal steps in wind and in load are equal steps to the right and up
+    assert np.diff(points[:, 0]) == pytest.approx(np.diff(points[:, 0])[::-1])
+    assert (np.diff(points[:, 1]) < 0).all()
+    assert "worst DEL error" in view.text() and "| heun, 10 ms | 4 | 1.0e-01 |" in view.text()
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(0.3, 9.7), (5.0, 25.0), (1e-6, 3e-6), (1e6, 1.001e6), (-3.0, 4.0)]
+)
+def test_ticks_are_round_and_enclose_the_values(low, high):
+    marks = ticks(low, high)
+    assert marks[0] <= low and marks[-1] >= high and 2 <= len(marks) <= 8
+    step = np.diff(marks)[0]
+    assert float(f"{step:.0e}") == pytest.approx(step)
+
+
+# --- the case that is played
+
+
+def test_log_is_followed_while_it_is_written_and_played_at_its_pace(tmp_path):
+    whole = motion(201)  # 10 s
+    first, rest = cut(whole, 0, 101), cut(whole, 101, 201)
+    player = bridge.Player(tmp_path / "case.mcap", pace=2.0)
+    assert not player.read(now=0.0), "there is no log yet"
+    with LogWriter(tmp_path / "case.mcap", run={"turbine": "nrel5mw"}, chunk_seconds=0.0) as log:
+        log.append(first)
+        assert player.read(now=100.0), "seen for the first time"
+        assert len(player.viewed.log.time) == 101 and not player.ended
+        log.append(rest)
+    player.read(now=101.0)
+    assert player.ended and len(player.viewed.log.time) == 201
+    assert np.array_equal(player.viewed.log.state, whole.state)
+    assert len(player.viewed.log.accepted) == 200
+    # began at 100: after 2.5 s at twice real time, 5 s and their 101 rows are due
+    assert player.due(now=102.5) == 101
+    assert player.due(now=105.1) == 201 and not player.played
+    player.sent = 201
+    assert player.played
+
+
+def cut(t, start, stop):
+    import dataclasses
+
+    within = slice(max(start - 1, 0), stop - 1)
+    return dataclasses.replace(
+        t, time=t.time[start:stop], state=t.state[start:stop], wind=t.wind[start:stop],
+        loads={k: v[start:stop] for k, v in t.loads.items()}, accepted=t.accepted[within],
+        discrepancy=t.discrepancy[within], threshold=t.threshold[within], local_error=t.local_error[within],
+    )  # fmt: skip
+
+
+def test_pace_must_be_positive():
+    for pace in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match="--pace"):
+            live.watcher(pace=pace)
+
+
+def test_missing_viewer_is_said_before_anything_runs(monkeypatch):
+    monkeypatch.setattr(window, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match="pip install"):
+        live.watcher()
+
+
+# --- the process beside the run, in all that can happen to its viewer
+
+
+def started(folder: Path, port: int, **told: object) -> subprocess.Popen[bytes]:
+    return live.start(Watched(str(folder), 1, [["u10_rk3_20ms"]], 1, port=port, **told))
+
+
+def test_bridge_ends_with_the_run_when_there_is_no_viewer(tmp_path):
+    process = started(tmp_path, window.free_port())
+    live.finish(process)
+    assert process.returncode == 0
+
+
+def test_bridge_that_does_not_answer_is_ended(tmp_path, monkeypatch):
+    monkeypatch.setattr(live, "END_SECONDS", 0.2)
+    process = started(tmp_path, window.free_port())
+    os.kill(process.pid, signal.SIGSTOP)
+    live.finish(process)
+    assert process.returncode == -signal.SIGKILL
+
+
+def test_bridge_that_stands_still_ends_itself_even_inside_a_call_that_never_returns():
+    code = "import ctypes; from fatigue_runner.viewer.bridge import heartbeat; heartbeat(0.3); ctypes.PyDLL(None).pause()"
+    done = subprocess.run([sys.executable, "-c", code], timeout=30, check=False)
+    assert done.returncode == 1  # PyDLL holds the interpreter's lock: no Python thread could have ended it
+
+
+CAMPAIGN = {
+    "name": "watched", "turbine": "nrel5mw", "duration": 20, "output_rate": 20, "workers": 1,
+    "wind": {"type": "constant", "speeds": [7, 9], "vertical_shear": 0.1},
+    "integrators": [{"method": "heun", "step": 0.02}, {"method": "rk4", "step": 0.04}],
+    "reference": {"method": "rk4", "step": 0.01},
+    "fatigue": {"wohler_exponents": [3, 10]},
+}  # fmt: skip
+
+
+def run(folder: Path, watch=None) -> dict[str, str]:
+    """Run the campaign; what of its outcome must not depend on who watches: states and loads of every log, and the DELs."""
+    from fatigue_runner.campaign import run_campaign
+    from fatigue_runner.logbook import read_log
+
+    results = run_campaign(CAMPAIGN, folder, watch=watch)
+    assert results.exit_code == 0
+    out = {}
+    for row in results:
+        log = read_log(folder / "logs" / f"{row['case_id']}.mcap")
+        digest = hashlib.sha256(log.time.tobytes() + log.state.tobytes() + log.accepted.tobytes())
+        for name in sorted(log.loads):
+            digest.update(log.loads[name].tobytes())
+        out[row["case_id"]] = digest.hexdigest() + str([v for k, v in row.items() if k.startswith("del_")])
+    return out
+
+
+@pytest.fixture(scope="module")
+def unwatched(tmp_path_factory) -> dict[str, str]:
+    return run(tmp_path_factory.mktemp("unwatched") / "run")
+
+
+@pytest.mark.slow
+class TestRun:
+    """Whole campaigns with a viewer that is open, absent, stopped or killed."""
+
+    @pytest.fixture(autouse=True)
+    def _needs_rerun(self):
+        pytest.importorskip("rerun", reason="rerun-sdk is not installed")
+
+    def test_viewer_open_shows_the_campaign_and_the_turbine(self, unwatched, tmp_path):
+        from viewer_pictures import near, part, screen, warm
+
+        port = window.free_port()
+        with screen(port=port) as viewer:
+            assert run(tmp_path / "run", live.watcher(port=port)) == unwatched
+            picture = viewer.soon()
+        assert warm(part(picture, 0.0, 0.6, 0.05, 0.6)).sum() > 800, "blades"
+        from fatigue_runner.viewer import colours
+
+        chart_ = part(picture, 0.6, 1.0, 0.5, 1.0)
+        assert sum(near(chart_, c, 25).sum() for c in (*colours.INTEGRATORS[:2], colours.REFERENCE)) > 60, (
+            "DELs"
+        )
+
+    def test_viewer_absent(self, unwatched, tmp_path):
+        assert run(tmp_path / "run", live.watcher(port=window.free_port())) == unwatched
+
+    @pytest.mark.parametrize("what", [signal.SIGSTOP, signal.SIGKILL])
+    def test_viewer_stopped_or_killed(self, unwatched, tmp_path, what):
+        port = window.free_port()
+        with window.viewer("--serve-grpc", "--port", str(port)) as process:
+            wait_for(port)
+            os.kill(process.pid, what)
+            try:
+                assert run(tmp_path / "run", live.watcher(port=port)) == unwatched
+            finally:
+                if what == signal.SIGSTOP:
+                    os.kill(process.pid, signal.SIGCONT)
+
+    def test_viewer_killed_while_a_case_is_played_ends_the_bridge(self, tmp_path):
+        write(tmp_path / "logs", "rk3", rows=2000)
+        port = window.free_port()
+        with window.viewer("--serve-grpc", "--port", str(port)) as process:
+            wait_for(port)
+            playing = started(tmp_path, port, pace=1.0)
+            live.finish(playing, wait=False)
+            time.sleep(3.0)
+            assert playing.poll() is None, "it plays on beyond the end of the run"
+            process.kill()
+            assert playing.wait(timeout=30) == 0
+
+    def test_stopped_viewer_ends_a_bridge_that_plays_much_in_time(self, tmp_path):
+        write(tmp_path / "logs", "rk3", rows=30000)
+        port = window.free_port()
+        with window.viewer("--serve-grpc", "--port", str(port)) as process:
+            wait_for(port)
+            os.kill(process.pid, signal.SIGSTOP)
+            try:
+                playing = started(tmp_path, port, pace=1e4)
+                live.finish(playing, wait=False)
+                playing.wait(timeout=60)
+            finally:
+                os.kill(process.pid, signal.SIGCONT)
+
+
+def wait_for(port: int) -> None:
+    for _ in range(200):
+        if bridge.listens(port):
+            return
+        time.sleep(0.05)
+    pytest.skip("the viewer's server does not start here")
