@@ -126,9 +126,19 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 def to_svg(figure: Figure) -> str:
     """The figure as an SVG document with its glyphs as outlines."""
+    _freeze_layout(figure)
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
+
+
+def _freeze_layout(figure: Figure) -> None:
+    """Lay the figure out once, on a grid: the solver's last bits differ from run to run, and they name clip paths."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    for axes in figure.axes:
+        left, bottom, width, height = (round(value, 6) for value in axes.get_position().bounds)
+        axes.set_position((left, bottom, width, height))
 
 
 def draw_legend(
@@ -147,9 +157,9 @@ def draw_legend(
         )
         for s in shown
     ]
-    # An entry takes its line (about 40 pt) and its glyphs; one row too wide would leave the page.
-    widest = 40.0 + 4.6 * max(len(str(entry.get_label())) for entry in entries)
-    ncols = min(len(entries), max(1, int(72.0 * figure.get_figwidth() / widest)))
+    # An entry takes its line and its gap (about 42 pt) and its glyphs; more than one row where they are too wide.
+    wide = sum(42.0 + 4.3 * len(str(entry.get_label())) for entry in entries)
+    ncols = math.ceil(len(entries) / math.ceil(wide / (72.0 * figure.get_figwidth())))
     figure.legend(handles=entries, loc="outside upper center", ncols=ncols, handlelength=2.6)
 
 
