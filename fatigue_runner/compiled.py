@@ -17,8 +17,11 @@ from typing import Any
 import numba
 from numba.core import config
 
-# `fastmath=True` lets LLVM assume that there is no NaN: no divergence check may stand in a function compiled with it.
-FAST = {"fastmath": True, "error_model": "numpy", "boundscheck": False, "nogil": True}
+# `nnan` lets LLVM assume that there is no NaN: no divergence check may stand in a function compiled with it.
+# Without `reassoc`: with it LLVM sorts sums anew each time that it optimises a function, so that a kernel gives other bits when
+# it was compiled in this process than when it came from the cache, and a resumed campaign other bits than its first half.
+_FLAGS = {"nnan", "ninf", "nsz", "arcp", "contract", "afn"}
+FAST = {"fastmath": _FLAGS, "error_model": "numpy", "boundscheck": False, "nogil": True}
 
 _KEPT = 8  # cache folders of earlier versions that stay
 

@@ -1,7 +1,7 @@
-"""Compiled time stepping with a learned correction of the local error: enhanced, and guarded (hybrid).
+"""Compiled time loop with a learned correction of the local error: enhanced, and guarded (hybrid).
 
-Enhanced: x+ = eta_h(x) + h^(p+1) N. Hybrid (arXiv 2504.05493, algorithm 1, mended): accepted where the corrected result agrees with
-that of a method of order p + 1, the fallback; else the fallback is taken. So every step ends within `limit` scaled units of it.
+Enhanced: x+ = eta_h(x) + h^(p+1) N. Hybrid (arXiv 2504.05493, algorithm 1, mended): accepted where the corrected result agrees
+with that of a method of order p + 1, the fallback; else the fallback is taken. So every step ends within `limit` scaled units of it.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ import numpy as np
 
 from fatigue_runner.compiled import FAST, njit
 from fatigue_runner.integrators.correction import correction
+from fatigue_runner.integrators.loops import RING, stages_of_step
 from fatigue_runner.integrators.stepping import (
-    HALF,
     WIDTH,
     WIND,
-    diverged,
-    interpolate,
+    all_fine,
+    combine,
     keep,
-    mixed_error,
-    shift,
-    stage_state,
+    mark_diverged,
+    scaled_error,
     wind_at,
+    write_output,
 )
 from fatigue_runner.turbine.generated import kernel
 from fatigue_runner.turbine.generated.kernel import LANES
@@ -37,121 +37,154 @@ def guard(new, fallback, corrected, x, atol, rtol, limit, norm, accepted, discre
     """
     for j in range(LANES):
         total = 0.0
-        bad = False
+        finite = True
         for i in range(16):
             m = i * LANES + j
             scale = atol[i] + max(abs(x[m]), abs(fallback[m])) * rtol[i]
             d = abs(corrected[m] - fallback[m]) / scale
-            bad = bad or not (d < np.inf)
+            finite = finite and d < np.inf
             total = max(total, d) if norm == NORM_MAX else total + d * d / 16.0
-        size = total if norm == NORM_MAX else np.sqrt(total)
-        ok = (not bad) and size <= limit
+        size = (total if norm == NORM_MAX else np.sqrt(total)) if finite else np.inf
+        ok = size <= limit
         accepted[j] = accepted[j] and ok
-        discrepancy[j] = max(discrepancy[j], size) if not bad else np.inf
+        discrepancy[j] = max(discrepancy[j], size)
         for i in range(16):
             m = i * LANES + j
             new[m] = corrected[m] if ok else fallback[m]
 
 
 @njit(**FAST)
-def fall_back(x, k, method, fallback, h, time, wind, model, clamped, k2, p, stage, out):
-    """Result of the fallback from x: more stages on top of the method's own, or smaller steps of the method itself."""
-    a, b, c = method
-    a2, b2, c2, shared, substeps = fallback
-    cell_duration, cells, changing = wind
-    tables, cell_count, constants, scratch, row = model
+def fall_back(n, h, now, current, states, k, fallback, wind, model, clamped, work, out):
+    """Result of the fallback from `current`, which is states[now]: more stages on top of the method's own, or smaller steps.
+
+    fallback = (stage table, result table, shared stages, substeps); work = (states (3, WIDTH), k, p, stage, slope).
+    """
+    (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), shared, substeps = fallback
+    cell_duration, wind_cells, changing = wind
+    tables, cells, constants, scratch, row = model
+    own, k2, p, stage, slope = work
     if substeps == 0:
-        for i in range(shared, len(b2)):
-            stage_state(x, k, a2[i], i, h, stage)
-            wind_at(time + c2[i] * h, cell_duration, cells, p)
-            _rhs(stage, p, k[i], 0, tables, cell_count, constants, scratch, row, clamped)
-        stage_state(x, k, b2, len(b2), h, out)
-        return
-    small = h / substeps
-    out[:] = x
-    for m in range(WIDTH):
-        k2[0, m] = k[0, m]
-    for n in range(substeps):
-        for i in range(0 if n > 0 else 1, len(b)):
-            stage_state(out, k2, a[i], i, small, stage)
-            wind_at(time + (n + c[i]) * small, cell_duration, cells, p)
-            _rhs(stage, p, k2[i], 0, tables, cell_count, constants, scratch, row, clamped)
-        stage_state(out, k2, b, len(b), small, stage)
-        out[:] = stage
+        for i in range(shared, len(c)):
+            s_rows[i, 0] = now
+            combine(states, now, k, s_rows, s_weights, i, s_counts[i], h, stage)
+            wind_at((n + c[i]) * h, cell_duration, wind_cells, p)
+            _rhs(stage, p, slope, 0, tables, cells, constants, scratch, row, clamped)
+            keep(slope, k, RING - 1 + i)
+        b_rows[0, 0] = now
+        combine(states, now, k, b_rows, b_weights, 0, b_count, h, out)
+    else:
+        small = h / substeps
+        b_rows[0, 0] = 0
+        keep(current, own, 0)
+        for m in range(WIDTH):
+            k2[0, m] = k[now, m]
+        for i in range(substeps):
+            number = n * substeps + i
+            # with constant wind, too: p must hold the wind at the sub-step's start
+            wind_at(number * small, cell_duration, wind_cells, p)
+            if i > 0:
+                _rhs(out, p, slope, 0, tables, cells, constants, scratch, row, clamped)
+                keep(slope, k2, 0)
+                keep(out, own, 0)
+            stages_of_step(
+                number, small, 0, own, k2, s_rows, s_weights, s_counts, c, cell_duration, wind_cells, changing,
+                tables, cells, constants, scratch, row, clamped, p, stage, slope,
+            )  # fmt: skip
+            combine(own, 0, k2, b_rows, b_weights, 0, b_count, small, out)
 
 
 @njit(**FAST)
-def corrected_steps(x, method, network, hybrid, fallback, tolerance, h, steps, wind, model, plan, rows, status, diverged_at, clamped):
-    """Advance one group by `steps` corrected steps of size h; arguments as `stepping.runge_kutta`, and
+def add(plain, defect, out):
+    """out = plain + defect"""
+    for m in range(WIDTH):
+        out[m] = plain[m] + defect[m]
 
-    method = (A, b, c) without a shared last stage; network as `correction.correction`; fallback = (A, b, c, shared stages, substeps);
-    tolerance = (atol (16,), rtol (16,), limit, norm); status = accepted (n - 1, LANES), discrepancy, local error: written.
+
+@njit(**FAST)
+def keep_largest(defect, largest):
+    """largest = max(largest, |defect|)"""
+    for m in range(WIDTH):
+        largest[m] = max(largest[m], abs(defect[m]))
+
+
+@njit(**FAST)
+def corrected_steps(
+    h, steps, method, network, safety, wind, model, plan, work, rows, status, diverged_at, clamped
+):
+    """Advance one group by `steps` corrected steps of size h, as `loops.runge_kutta`, and
+
+    method = (stage table, result table, rows of the stage slopes); network as `correction.correction`;
+    safety = (hybrid, fallback, atol (16,), rtol (16,), limit, norm); work = (states, k, restart).
+    status = (accepted, discrepancy, local error) (n - 1, LANES) are written: the worst of each output interval.
     """
-    a, b, c = method
+    (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), stage_rows = method
+    hybrid, fallback, atol, rtol, limit, norm = safety
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     out_step, exact, position, velocity = plan
-    atol, rtol, limit, norm = tolerance
+    states, k, restart = work
     accepted_out, discrepancy_out, error_out = status
-    stages = len(b)
-    k, k2 = np.zeros((stages + 4, WIDTH)), np.zeros((stages, WIDTH))
     p, start, middle = np.zeros(WIND), np.zeros(WIND), np.zeros(WIND)
-    stage, plain, corrected, new = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
-    defect, other = np.zeros(WIDTH), np.zeros(WIDTH)
-    features, hidden = np.zeros(1024 * LANES), np.zeros((2, 1024 * LANES))
-    states, accelerations = np.zeros((3, WIDTH)), np.zeros((3, HALF))
-    local_error, discrepancy, bad = np.zeros(LANES), np.zeros(LANES), np.zeros(LANES, np.int64)
-    accepted = np.ones(LANES, np.bool_)
+    stage, slope, plain, fixed = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
+    other, current, result = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
+    defect, largest = np.zeros(WIDTH), np.zeros(WIDTH)
+    features, hidden = np.zeros(512 * LANES), np.zeros((2, 512 * LANES))
+    inner = (np.zeros((3, WIDTH)), np.zeros_like(k), np.zeros(WIND), np.zeros(WIDTH), np.zeros(WIDTH))
+    discrepancy, accepted = np.zeros(LANES), np.ones(LANES, np.bool_)
+    now, output, all_diverged = 0, 1, False
 
-    wind_at(0.0, cell_duration, wind_cells, start)
-    wind_at(0.0, cell_duration, wind_cells, middle)
+    keep(restart, rows, 0)
+    current[:] = restart
     wind_at(0.0, cell_duration, wind_cells, p)
-    _rhs(x, p, k[0], 0, tables, cells, constants, scratch, row, clamped)
-    keep(states, accelerations, x, k[0])
-    rows[0, :] = x
-    output = 1
+    start[:] = p
+    middle[:] = p
+    _rhs(current, p, slope, 0, tables, cells, constants, scratch, row, clamped)
+    keep(slope, k, 0)
     for n in range(steps):
-        time = n * h
-        for i in range(1, stages):
-            stage_state(x, k, a[i], i, h, stage)
-            if changing:
-                wind_at(time + c[i] * h, cell_duration, wind_cells, p)
-            _rhs(stage, p, k[i], 0, tables, cells, constants, scratch, row, clamped)
-        stage_state(x, k, b, stages, h, plain)
+        new = (now + 1) % 3
+        at = stages_of_step(
+            n, h, now, states, k, s_rows, s_weights, s_counts, c, cell_duration, wind_cells, changing,
+            tables, cells, constants, scratch, row, clamped, p, stage, slope,
+        )  # fmt: skip
+        b_rows[0, 0] = now
+        combine(states, now, k, b_rows, b_weights, 0, b_count, h, plain)
         if changing:
-            wind_at(time + 0.5 * h, cell_duration, wind_cells, middle)
-            wind_at(time + h, cell_duration, wind_cells, p)
-        correction(x, k, stages, h, start, middle, p, network, features, hidden, defect)
-        for m in range(WIDTH):
-            corrected[m] = plain[m] + defect[m]
+            wind_at((n + 0.5) * h, cell_duration, wind_cells, middle)
+            if at != 1.0:
+                wind_at((n + 1) * h, cell_duration, wind_cells, p)
+        stage_rows[0] = now
+        correction(current, k, stage_rows, h, start, middle, p, network, features, hidden, defect)
+        add(plain, defect, fixed)
         if hybrid:
-            fall_back(x, k, method, fallback, h, time, wind, model, clamped, k2, p, stage, other)
-            guard(new, other, corrected, x, atol, rtol, limit, norm, accepted, discrepancy)
+            fall_back(n, h, now, current, states, k, fallback, wind, model, clamped, inner, other)
+            guard(result, other, fixed, current, atol, rtol, limit, norm, accepted, discrepancy)
+            # the logged error estimate is the embedded one, not the learned one
             for m in range(WIDTH):
                 defect[m] = other[m] - plain[m]
-            if changing:
-                wind_at(time + h, cell_duration, wind_cells, p)
         else:
-            new[:] = corrected
-        mixed_error(defect, plain, local_error)
-        diverged(new, (n + 1) * h, diverged_at, x, bad)
-        _rhs(new, p, k[0], 0, tables, cells, constants, scratch, row, clamped)
-        start[:] = p
-        shift(states, accelerations)
-        keep(states, accelerations, new, k[0])
-        written = False
+            add(plain, defect, result)
+        keep_largest(defect, largest)
+        if not all_fine(result):
+            all_diverged = mark_diverged(result, (n + 1) * h, diverged_at, restart)
+        keep(result, states, new)
+        for m in range(WIDTH):
+            current[m] = result[m]
+        _rhs(result, p, slope, 0, tables, cells, constants, scratch, row, clamped)
+        keep(slope, k, new)
+        for m in range(WIND):
+            start[m] = p[m]
+        now, first = new, output
         while output < len(out_step) and out_step[output] <= n + 1:
-            if exact[output]:
-                rows[output, :] = new
-            else:
-                interpolate(position[output], velocity[output], h, states, accelerations, rows[output])
-            accepted_out[output - 1, :] = accepted
-            discrepancy_out[output - 1, :] = discrepancy
-            error_out[output - 1, :] = local_error
-            written = True
+            write_output(output, exact, position, velocity, h, states, k, now, rows)
+            if output == first:
+                scaled_error(largest, result, error_out, output - 1)
+            for j in range(LANES):
+                error_out[output - 1, j] = error_out[first - 1, j]
+                accepted_out[output - 1, j] = accepted[j]
+                discrepancy_out[output - 1, j] = discrepancy[j]
             output += 1
-        if written:
-            local_error[:] = 0.0
+        if output > first:
             discrepancy[:] = 0.0
             accepted[:] = True
-        x[:] = new
+        if all_diverged:
+            break

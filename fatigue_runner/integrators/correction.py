@@ -23,8 +23,8 @@ FIXED_ROWS = 27
 
 
 @njit(**FAST)
-def features(x, k, stages, h, ratio, start, middle, end, rows):
-    """Rows of `corrector.features.names(stages)`: x (16, LANES) and k (stages, 16 * LANES) of the step, wind at three times."""
+def features(x, k, stage_rows, h, ratio, start, middle, end, rows):
+    """Rows of `corrector.features.names(stages)`: x (16, LANES), the stage slopes k[stage_rows], wind at three times."""
     inverse = 1.0 / ratio
     for j in range(LANES):
         rows[j] = 1.0
@@ -50,8 +50,9 @@ def features(x, k, stages, h, ratio, start, middle, end, rows):
         cosine = 1.0 - 2.0 * sine * sine
         rows[25 * LANES + j] = 2.0 * double * cosine
         rows[26 * LANES + j] = 1.0 - 2.0 * double * double
-    for s in range(stages):
-        first = (FIXED_ROWS + 8 * s) * LANES
+    for i in range(len(stage_rows)):
+        s = stage_rows[i]
+        first = (FIXED_ROWS + 8 * i) * LANES
         for m in range(7 * LANES):
             rows[first + m] = h * k[s, 8 * LANES + m]
         for j in range(LANES):
@@ -103,7 +104,9 @@ def dense(typing_context, rows, weights, inputs, blocks, out):
             first_weight = builder.mul(builder.mul(block.index, count), block_size)
             with cgutils.for_range(builder, count) as feature:
                 place = builder.mul(feature.index, lanes)
-                x = [aligned(builder.load(at(row, builder.add(place, word(p * VECTOR))))) for p in range(parts)]
+                x = [
+                    aligned(builder.load(at(row, builder.add(place, word(p * VECTOR))))) for p in range(parts)
+                ]
                 base = builder.add(first_weight, builder.mul(feature.index, block_size))
                 for o in range(BLOCK):
                     w = builder.load(builder.gep(weight, [builder.add(base, word(o))]))
@@ -163,7 +166,7 @@ def activate(values, count, kind):
 
 
 @njit(**FAST)
-def correction(x, k, stages, h, start, middle, end, network, rows, hidden, out):
+def correction(x, k, stage_rows, h, start, middle, end, network, rows, hidden, out):
     """out (16, LANES) = linear part of the features plus a network of the features: the learned defect of the step.
 
     network = (raw, ratio, products, linear weights, net weights, sizes, activation): weights as `pack` orders them, one layer
@@ -174,8 +177,8 @@ def correction(x, k, stages, h, start, middle, end, network, rows, hidden, out):
         raw_features(x, start, rows)
         count = RAW_ROWS
     else:
-        features(x, k, stages, h, ratio, start, middle, end, rows)
-        count = FIXED_ROWS + 8 * stages
+        features(x, k, stage_rows, h, ratio, start, middle, end, rows)
+        count = FIXED_ROWS + 8 * len(stage_rows)
     inputs = count
     if products:
         times_azimuth(count, rows)

@@ -5,52 +5,59 @@ from __future__ import annotations
 import numpy as np
 
 from fatigue_runner.compiled import FAST, njit
-from fatigue_runner.integrators.correction import FIXED_ROWS, features
-from fatigue_runner.integrators.stepping import WIDTH, WIND, stage_state, wind_at
+from fatigue_runner.integrators.correction import features, raw_features
+from fatigue_runner.integrators.loops import stages_of_step
+from fatigue_runner.integrators.stepping import WIDTH, WIND, combine, keep, wind_at
 from fatigue_runner.turbine.generated import kernel
-from fatigue_runner.turbine.generated.kernel import LANES
 
 _rhs = kernel.rhs
 
 
 @njit(**FAST)
-def integrate(x, method, h, start, steps, cells, model, clamped, k, p, stage):
-    """`steps` plain steps of size h from time `start` [s] of the cubic wind piece `cells` (1, 4, WIND); x is overwritten."""
-    a, b, c = method
-    tables, cell_count, constants, scratch, row = model
-    stages = len(b)
+def integrate(x, method, h, steps, wind, model, clamped, k, p, stage, slope, states):
+    """`steps` plain steps of size h from x (WIDTH,), which is overwritten; k[0] and k[3:] are the last step's slopes."""
+    (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count) = method
+    cell_duration, wind_cells, changing = wind
+    tables, cells, constants, scratch, row = model
+    b_rows[0, 0] = 0
     for n in range(steps):
-        for i in range(stages):
-            stage_state(x, k, a[i], i, h, stage)
-            wind_at(start + (n + c[i]) * h, 1e9, cells, p)
-            _rhs(stage, p, k[i], 0, tables, cell_count, constants, scratch, row, clamped)
-        stage_state(x, k, b, stages, h, stage)
-        x[:] = stage
+        keep(x, states, 0)
+        wind_at(n * h, cell_duration, wind_cells, p)
+        _rhs(x, p, slope, 0, tables, cells, constants, scratch, row, clamped)
+        keep(slope, k, 0)
+        stages_of_step(
+            n, h, 0, states, k, s_rows, s_weights, s_counts, c, cell_duration, wind_cells, changing,
+            tables, cells, constants, scratch, row, clamped, p, stage, slope,
+        )  # fmt: skip
+        combine(states, 0, k, b_rows, b_weights, 0, b_count, h, x)
 
 
 @njit(**FAST)
-def step_samples(x, cells, method, h, accurate, substeps, ratio, model, clamped, rows, plain, exact):
+def step_samples(
+    x, pieces, method, stage_rows, h, accurate, substeps, ratio, model, clamped, rows, raw, plain, exact
+):
     """One step of `method` from each of the states x (groups, WIDTH) under its own cubic wind piece (groups, 4, WIND).
 
-    Written: rows (groups, n, LANES) what a corrector sees, plain (groups, WIDTH) the method's result, exact (groups, WIDTH) that of
-    `substeps` steps of the method `accurate`.
+    Written: rows (groups, n * LANES) what a stage-aware corrector sees, raw (groups, 18 * LANES) what the paper's sees,
+    plain (groups, WIDTH) the method's result, exact (groups, WIDTH) that of `substeps` steps of the method `accurate`.
     """
-    a, b, c = method
-    stages = len(b)
-    k = np.zeros((16, WIDTH))
-    p, stage = np.zeros(WIND), np.zeros(WIDTH)
+    k = np.zeros((20, WIDTH))
+    p, states = np.zeros(WIND), np.zeros((3, WIDTH))
+    stage, slope, now = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
     start, middle, end = np.zeros(WIND), np.zeros(WIND), np.zeros(WIND)
-    flat = np.zeros((FIXED_ROWS + 8 * stages) * LANES)
     piece = np.zeros((1, 4, WIND))
     for group in range(x.shape[0]):
-        piece[0] = cells[group]
-        plain[group] = x[group]
-        integrate(plain[group], (a, b, c), h, 0.0, 1, piece, model, clamped, k, p, stage)
+        piece[0] = pieces[group]
+        wind = (1e9, piece, True)
+        now[:] = x[group]
+        integrate(now, method, h, 1, wind, model, clamped, k, p, stage, slope, states)
+        plain[group] = now
         wind_at(0.0, 1e9, piece, start)
         wind_at(0.5 * h, 1e9, piece, middle)
         wind_at(h, 1e9, piece, end)
-        features(x[group], k, stages, h, ratio, start, middle, end, flat)
-        for i in range(len(flat)):
-            rows[group, i // LANES, i % LANES] = flat[i]
-        exact[group] = x[group]
-        integrate(exact[group], accurate, h / substeps, 0.0, substeps, piece, model, clamped, k, p, stage)
+        stage_rows[0] = 0
+        features(x[group], k, stage_rows, h, ratio, start, middle, end, rows[group])
+        raw_features(x[group], start, raw[group])
+        now[:] = x[group]
+        integrate(now, accurate, h / substeps, substeps, wind, model, clamped, k, p, stage, slope, states)
+        exact[group] = now

@@ -1,25 +1,57 @@
-"""The registry of methods: name -> method. Adding a Runge-Kutta method is one entry in tableaux.py and one word here."""
+"""The registry of methods: name -> method.
+
+Adding a Runge-Kutta method is one entry in tableaux.py, an Adams method one in multistep.py, and one word here.
+"""
 
 from __future__ import annotations
 
 from functools import cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.integrators import multistep as m
 from fatigue_runner.integrators import tableaux as t
-from fatigue_runner.integrators.tableaux import ButcherTableau
 
-_TABLEAUX = {
-    m.name: m for m in (t.EULER, t.HEUN, t.RK3, t.HEUN_RICHARDSON, t.BS32, t.RK4, t.DP5, t.TSIT5, t.RK7)
-}
 
-METHODS = (*_TABLEAUX, "dop853")
+class Method(Protocol):
+    """What every fixed-step method tells about itself."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def order(self) -> int: ...
+    @property
+    def source(self) -> str: ...
+    @property
+    def evaluations_per_step(self) -> int: ...
+
+    def evaluations(self, steps: int) -> int:
+        """Evaluations of f in a run of `steps` steps, the initial one and a start-up included."""
+        ...
+
+    def growth(self, z: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Largest growth per step of a solution of x' = lambda x at z = h lambda."""
+        ...
+
+
+_BY_NAME: dict[str, Method] = {
+    x.name: x
+    for x in (
+        t.EULER, t.HEUN, t.RK3, t.HEUN_RICHARDSON, t.BS32, t.RK4, t.DP5, t.TSIT5, t.RK7, m.AB4, m.ABM4,
+    )
+}  # fmt: skip
+
+METHODS = (*_BY_NAME, "dop853")
 
 
 @cache
-def method(name: str) -> ButcherTableau:
+def method(name: str) -> Method:
     """The method of this name. Raises InputError with the nearest known one."""
-    if name == "dop853":
+    if name == "dop853":  # made from SciPy's coefficients: not before someone asks
         return t.dop853()
-    if name not in _TABLEAUX:
+    if name not in _BY_NAME:
         raise InputError(f"unknown integrator {name!r}{did_you_mean(name, METHODS)}")
-    return _TABLEAUX[name]
+    return _BY_NAME[name]

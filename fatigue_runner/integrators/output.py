@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class OutputPlan:
-    """time (n,) [s]; `step` (n,) the step in whose interval each output lies (0: the start); `exact` where it is the step's end.
+    """time (n,) [s]; `step` (n,) the step after which each output is known (0: the start); `exact` where it is the step's end.
 
     position, velocity (n, 9): weights of q, h q', h^2 q'' at the ends n-1, n, n+1 (node by node) for q and for h q'.
     """
@@ -60,9 +60,11 @@ def plan_output(
     number = np.where(exact, nearest, np.ceil(place)).astype(np.int64)
     position, velocity = np.zeros((len(time), 9)), np.zeros((len(time), 9))
     for i in np.flatnonzero(~exact):
+        three = order > 4 and steps > 1
+        if three and number[i] == 1:
+            number[i] = 2  # the first step's outputs wait for the second step's end, to have three step ends
         # theta is rounded so that equal places of different steps share their weights
         theta = round(float(place[i] - (number[i] - 1)), 9)
-        three = order > 4 and number[i] > 1
         nodes = (-1.0, 0.0, 1.0) if three else (0.0, 1.0)
         q, v = hermite_weights(theta, nodes)
         position[i, 9 - len(q) :], velocity[i, 9 - len(v) :] = q, v

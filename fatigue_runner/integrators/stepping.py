@@ -1,18 +1,16 @@
-"""Compiled time stepping of one group of LANES cases in lockstep.
+"""Compiled pieces of a time step of one group of LANES cases in lockstep; `loops` puts them together.
 
-`fastmath` lets LLVM assume that there is no NaN, so the divergence check is a function of its own without it, compared
-against a bound. Loops over the state have the constant length WIDTH, so that they vectorise.
+`FAST` lets LLVM assume that there is no NaN, so the divergence check is a function of its own without it, compared
+against a bound. Loops over the state have the constant length WIDTH and write to one array, so that they vectorise.
+Whole arrays and row numbers are passed, never rows: numba counts references of a row atomically, which cost as much as half an
+evaluation (measured); and functions have one exit, so that it can drop the counting of their arguments.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
 from fatigue_runner.compiled import FAST, njit
-from fatigue_runner.turbine.generated import kernel
 from fatigue_runner.turbine.generated.kernel import LANES
 
-_rhs = kernel.rhs
 WIDTH = 16 * LANES
 HALF = 8 * LANES
 WIND = 3 * LANES
@@ -23,22 +21,42 @@ AZIMUTH_BOUND = 1e9
 
 
 @njit(nogil=True, error_model="numpy")
-def diverged(x, time, diverged_at, previous, bad):
-    """Mark lanes whose state left the bounds or is no number, and put them back so that they stay finite."""
+def all_fine(x):
+    """Whether all lanes are surely within the bounds: sum of |x| / bound below 1. A NaN makes the comparison false."""
+    fine = 0
     for j in range(LANES):
-        bad[j] = 0
-    for i in range(16):
-        bound = AZIMUTH_BOUND if i == 6 or i == 7 else STATE_BOUND
-        for j in range(LANES):
-            # a comparison with NaN is false, so a NaN counts as bad
-            bad[j] |= 0 if abs(x[i * LANES + j]) < bound else 1
-    if bad.any():
-        for j in range(LANES):
-            if bad[j]:
-                if diverged_at[j] < 0.0:
-                    diverged_at[j] = time
-                for i in range(16):
-                    x[i * LANES + j] = previous[i * LANES + j]
+        tower = abs(x[j]) + abs(x[LANES + j]) + abs(x[8 * LANES + j]) + abs(x[9 * LANES + j])
+        flap = abs(x[2 * LANES + j]) + abs(x[3 * LANES + j]) + abs(x[4 * LANES + j])
+        flap_rate = abs(x[10 * LANES + j]) + abs(x[11 * LANES + j]) + abs(x[12 * LANES + j])
+        rest = (
+            abs(x[5 * LANES + j]) + abs(x[13 * LANES + j]) + abs(x[14 * LANES + j]) + abs(x[15 * LANES + j])
+        )
+        azimuth = abs(x[6 * LANES + j]) + abs(x[7 * LANES + j])
+        total = (tower + flap + flap_rate + rest) / STATE_BOUND + azimuth / AZIMUTH_BOUND
+        fine += 1 if total < 1.0 else 0
+    return fine == LANES
+
+
+@njit(nogil=True, error_model="numpy")
+def mark_diverged(x, time, diverged_at, restart):
+    """Note the time for lanes that left the bounds and put them on their `restart` state, so that they stay finite.
+
+    Returns whether all lanes have diverged by now.
+    """
+    count = 0
+    for j in range(LANES):
+        bad = False
+        for i in range(16):
+            bound = AZIMUTH_BOUND if i == 6 or i == 7 else STATE_BOUND
+            # written so that a NaN, whose comparisons are false, counts as bad
+            bad = bad or not abs(x[i * LANES + j]) < bound
+        if bad:
+            if diverged_at[j] < 0.0:
+                diverged_at[j] = time
+            for i in range(16):
+                x[i * LANES + j] = restart[i * LANES + j]
+        count += 1 if diverged_at[j] >= 0.0 else 0
+    return count == LANES
 
 
 @njit(**FAST)
@@ -52,123 +70,114 @@ def wind_at(time, cell_duration, cells, p):
 
 
 @njit(**FAST)
-def stage_state(x, k, weights, count, h, out):
-    """out = x + h sum_j weights[j] k[j]"""
-    for m in range(WIDTH):
-        out[m] = x[m]
-    for j in range(count):
-        a = h * weights[j]
-        if a != 0.0:
-            for m in range(WIDTH):
-                out[m] += a * k[j, m]
+def combine(states, now, k, rows, weights, line, count, h, out):
+    """out = states[now] + h sum_j weights[line, j] k[rows[line, j]], j < count: as few passes over the state as possible.
+
+    `out` (WIDTH,) must be an array of its own: LLVM's check for overlap would take the scalar loop. The tables are padded with
+    zero weights of row 0 to a multiple of four.
+    """
+    a, p = h * weights[line, 0], rows[line, 0]
+    b, q = h * weights[line, 1], rows[line, 1]
+    c, r = h * weights[line, 2], rows[line, 2]
+    d, s = h * weights[line, 3], rows[line, 3]
+    if count == 1:
+        for m in range(WIDTH):
+            out[m] = states[now, m] + a * k[p, m]
+    elif count == 2:
+        for m in range(WIDTH):
+            out[m] = states[now, m] + (a * k[p, m] + b * k[q, m])
+    elif count == 3:
+        for m in range(WIDTH):
+            out[m] = states[now, m] + (a * k[p, m] + b * k[q, m] + c * k[r, m])
+    else:
+        for m in range(WIDTH):
+            out[m] = states[now, m] + ((a * k[p, m] + b * k[q, m]) + (c * k[r, m] + d * k[s, m]))
+    for j in range(4, count, 4):
+        a, p = h * weights[line, j], rows[line, j]
+        b, q = h * weights[line, j + 1], rows[line, j + 1]
+        c, r = h * weights[line, j + 2], rows[line, j + 2]
+        d, s = h * weights[line, j + 3], rows[line, j + 3]
+        for m in range(WIDTH):
+            out[m] += (a * k[p, m] + b * k[q, m]) + (c * k[r, m] + d * k[s, m])
 
 
 @njit(**FAST)
-def mixed_error(difference, x, local_error):
-    """local_error = max(local_error, max over states of |difference| / (1 + |x|)), per lane."""
+def keep(values, table, line):
+    """table[line] = values"""
+    for m in range(WIDTH):
+        table[line, m] = values[m]
+
+
+@njit(**FAST)
+def move(table, line, to):
+    """table[to] = table[line]"""
+    for m in range(WIDTH):
+        table[to, m] = table[line, m]
+
+
+@njit(**FAST)
+def largest_error(k, rows, weights, count, h, largest):
+    """largest = max(largest, |h sum_j weights[0, j] k[rows[0, j]]|), element by element; at most eight terms."""
+    a, p = h * weights[0, 0], rows[0, 0]
+    b, q = h * weights[0, 1], rows[0, 1]
+    c, r = h * weights[0, 2], rows[0, 2]
+    d, s = h * weights[0, 3], rows[0, 3]
+    if count <= 4:
+        for m in range(WIDTH):
+            e = (a * k[p, m] + b * k[q, m]) + (c * k[r, m] + d * k[s, m])
+            largest[m] = max(largest[m], abs(e))
+    else:
+        a2, p2 = h * weights[0, 4], rows[0, 4]
+        b2, q2 = h * weights[0, 5], rows[0, 5]
+        c2, r2 = h * weights[0, 6], rows[0, 6]
+        d2, s2 = h * weights[0, 7], rows[0, 7]
+        for m in range(WIDTH):
+            e = (a * k[p, m] + b * k[q, m]) + (c * k[r, m] + d * k[s, m])
+            f = (a2 * k[p2, m] + b2 * k[q2, m]) + (c2 * k[r2, m] + d2 * k[s2, m])
+            largest[m] = max(largest[m], abs(e + f))
+
+
+@njit(**FAST)
+def scaled_error(largest, x, errors, interval):
+    """errors[interval] (LANES,) = largest component of `largest` / (1 + |x|), per lane; `largest` starts anew."""
+    for j in range(LANES):
+        errors[interval, j] = 0.0
     for i in range(16):
         for j in range(LANES):
-            e = abs(difference[i * LANES + j]) / (1.0 + abs(x[i * LANES + j]))
-            local_error[j] = max(local_error[j], e)
-
-
-@njit(**FAST)
-def interpolate(position, velocity, h, states, accelerations, out):
-    """One output row from three step ends: states (3, WIDTH), accelerations (3, HALF)."""
-    for m in range(HALF):
-        out[m] = 0.0
-        out[HALF + m] = 0.0
-    for node in range(3):
-        for part in range(3):
-            a = position[3 * node + part] * h**part
-            b = velocity[3 * node + part] * h ** (part - 1.0)
-            if a == 0.0 and b == 0.0:
-                continue
-            for m in range(HALF):
-                value = accelerations[node, m] if part == 2 else states[node, part * HALF + m]
-                out[m] += a * value
-                out[HALF + m] += b * value
-
-
-@njit(**FAST)
-def shift(states, accelerations):
-    """Make room for a new step end at row 2."""
-    for node in range(2):
-        for m in range(WIDTH):
-            states[node, m] = states[node + 1, m]
-        for m in range(HALF):
-            accelerations[node, m] = accelerations[node + 1, m]
-
-
-@njit(**FAST)
-def keep(states, accelerations, x, slope):
-    """Store state and acceleration at the newest step end."""
+            e = largest[i * LANES + j] / (1.0 + abs(x[i * LANES + j]))
+            errors[interval, j] = max(errors[interval, j], e)
     for m in range(WIDTH):
-        states[2, m] = x[m]
-    for m in range(HALF):
-        accelerations[2, m] = slope[HALF + m]
+        largest[m] = 0.0
 
 
 @njit(**FAST)
-def runge_kutta(x, method, h, steps, wind, model, plan, rows, errors, diverged_at, clamped):
-    """Advance one group by `steps` steps of size h.
+def write_output(output, exact, position, velocity, h, states, k, newest, rows):
+    """Write output row `output`: the newest step end, or the Hermite polynomial through the last three.
 
-    x (WIDTH,) in and out; method = (A, b, error weights, c, last stage shared); wind = (cell duration, cells, changing);
-    model = (tables, cells, constants, scratch, row); plan = (step, exact, position, velocity) of `output.OutputPlan`;
-    rows (n, WIDTH) are written; errors (n - 1, LANES) too where the method has an embedded one: the largest of the steps of
-    each output interval; `diverged_at` (LANES,) is -1 or the time.
+    states (3, WIDTH), slopes k (.., WIDTH): rings of three step ends, `newest` the last; position, velocity (n, 9): weights of
+    value, h slope, h^2 curvature, node by node, for positions and for h times velocities.
     """
-    a, b, e, c, shared = method
-    cell_duration, wind_cells, changing = wind
-    tables, cells, constants, scratch, row = model
-    out_step, exact, position, velocity = plan
-    stages = len(b)
-    computed = stages - 1 if shared else stages
-    k = np.zeros((stages, WIDTH))
-    p, stage, new = np.zeros(WIND), np.zeros(WIDTH), np.zeros(WIDTH)
-    states, accelerations = np.zeros((3, WIDTH)), np.zeros((3, HALF))
-    local_error, bad = np.zeros(LANES), np.zeros(LANES, np.int64)
-    embedded = False
-    for i in range(stages):
-        embedded = embedded or e[i] != 0.0
-
-    wind_at(0.0, cell_duration, wind_cells, p)
-    _rhs(x, p, k[0], 0, tables, cells, constants, scratch, row, clamped)
-    keep(states, accelerations, x, k[0])
-    rows[0, :] = x
-    output = 1
-    for n in range(steps):
-        for i in range(1, computed):
-            stage_state(x, k, a[i], i, h, stage)
-            if changing:
-                wind_at((n + c[i]) * h, cell_duration, wind_cells, p)
-            _rhs(stage, p, k[i], 0, tables, cells, constants, scratch, row, clamped)
-        stage_state(x, k, b, computed, h, new)
-        diverged(new, (n + 1) * h, diverged_at, x, bad)
-        if embedded:
-            for m in range(WIDTH):
-                stage[m] = 0.0
-            stage_state(stage, k, e, computed, h, stage)
-        if changing:
-            wind_at((n + 1) * h, cell_duration, wind_cells, p)
-        _rhs(new, p, k[0], 0, tables, cells, constants, scratch, row, clamped)
-        if embedded:
-            if shared:
-                for m in range(WIDTH):
-                    stage[m] += h * e[stages - 1] * k[0, m]
-            mixed_error(stage, new, local_error)
-        shift(states, accelerations)
-        keep(states, accelerations, new, k[0])
-        written = False
-        while output < len(out_step) and out_step[output] <= n + 1:
-            if exact[output]:
-                rows[output, :] = new
-            else:
-                interpolate(position[output], velocity[output], h, states, accelerations, rows[output])
-            if embedded:
-                errors[output - 1, :] = local_error
-            written = True
-            output += 1
-        if written:
-            local_error[:] = 0.0
-        x[:] = new
+    n0, n1, n2 = (newest + 1) % 3, (newest + 2) % 3, newest
+    if exact[output]:
+        for m in range(WIDTH):
+            rows[output, m] = states[n2, m]
+    else:
+        o = output
+        a0, a1, a2 = position[o, 0], position[o, 1] * h, position[o, 2] * h * h
+        b0, b1, b2 = position[o, 3], position[o, 4] * h, position[o, 5] * h * h
+        c0, c1, c2 = position[o, 6], position[o, 7] * h, position[o, 8] * h * h
+        for m in range(HALF):
+            rows[o, m] = (
+                (a0 * states[n0, m] + a1 * states[n0, HALF + m] + a2 * k[n0, HALF + m])
+                + (b0 * states[n1, m] + b1 * states[n1, HALF + m] + b2 * k[n1, HALF + m])
+                + (c0 * states[n2, m] + c1 * states[n2, HALF + m] + c2 * k[n2, HALF + m])
+            )
+        a0, a1, a2 = velocity[o, 0] / h, velocity[o, 1], velocity[o, 2] * h
+        b0, b1, b2 = velocity[o, 3] / h, velocity[o, 4], velocity[o, 5] * h
+        c0, c1, c2 = velocity[o, 6] / h, velocity[o, 7], velocity[o, 8] * h
+        for m in range(HALF):
+            rows[o, HALF + m] = (
+                (a0 * states[n0, m] + a1 * states[n0, HALF + m] + a2 * k[n0, HALF + m])
+                + (b0 * states[n1, m] + b1 * states[n1, HALF + m] + b2 * k[n1, HALF + m])
+                + (c0 * states[n2, m] + c1 * states[n2, HALF + m] + c2 * k[n2, HALF + m])
+            )

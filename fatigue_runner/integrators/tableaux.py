@@ -13,7 +13,7 @@ Number = Fraction | float
 Array = NDArray[np.float64]
 
 
-def F(text: str) -> list[Number]:  # noqa: N802
+def F(text: str) -> list[Number]:
     """Exact row: '1/4 1/4' -> fractions."""
     return [Fraction(word) for word in text.split()]
 
@@ -60,6 +60,10 @@ class ButcherTableau:
     def evaluations_per_step(self) -> int:
         return self.stages - self.first_same_as_last
 
+    def evaluations(self, steps: int) -> int:
+        """Of a run of `steps` steps, with the initial slope."""
+        return 1 + steps * self.evaluations_per_step
+
     @property
     def c(self) -> tuple[Number, ...]:
         """Stage times in steps."""
@@ -78,6 +82,10 @@ class ButcherTableau:
             total = total + factor * (b @ power)
             power, factor = a @ power, factor * z
         return total
+
+    def growth(self, z: NDArray[np.complex128]) -> Array:
+        """|R(z)|"""
+        return np.abs(self.stability_function(z))
 
 
 @lru_cache(maxsize=64)
