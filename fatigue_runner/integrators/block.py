@@ -164,7 +164,7 @@ def _run_group(
     else:
         corrected_steps(
             step, steps, correcting.method, correcting.network, correcting.safety, wind_data, model, plan_data,
-            work, group.rows, (group.accepted, group.discrepancy, group.errors),
+            (states, k, aligned(start)), group.rows, (group.accepted, group.discrepancy, group.errors),
             group.diverged_at, clamped,
         )  # fmt: skip
     group.wall = time.perf_counter() - begin
