@@ -66,6 +66,13 @@ def test_optional_status_comes_back_and_is_absent_where_unknown(tmp_path):
     assert plain.reference_error.size == 0 and plain.clamped_lookups_at.size == 0
 
 
+def test_metadata_of_any_type_and_from_any_file_name_can_be_written(tmp_path):
+    run = {"seed": 3, "step": np.float64(0.1), "corrector": None, "path": "runs/\udce4.yaml", "note": "Böe"}
+    log = read_log(write_log(tmp_path / "a.mcap", example(5), run, {"\udce4.yaml": b"x"}))
+    assert [log.run[k] for k in run] == ["3", "0.1", "", "runs/\\udce4.yaml", "Böe"]
+    assert log.attachments == {"\\udce4.yaml": b"x"}
+
+
 def test_a_diverged_case_says_when(tmp_path):
     trajectory = example(50)
     trajectory.diverged_at = 1 / 3

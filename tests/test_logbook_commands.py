@@ -79,6 +79,18 @@ def test_info_says_what_ran_how_often_it_was_accepted_and_the_extremes(log_path)
     assert "rotor_thrust" in text and "kN" in text and "campaign.yaml" in text
 
 
+def test_info_shows_equivalent_loads_with_their_errors_as_a_table_and_all_shows_them_as_they_are(tmp_path):
+    load = "blade1_root_flapwise_moment_m10"
+    result = {f"del_{load}": 4.928e6, f"del_error_{load}": -0.00123, "nrmse_edge": 0.5, "nrmse_max": 0.25}
+    path = write_log(tmp_path / "a.mcap", example(), RUN, None, result)
+    assert [(e.value, e.error) for e in summarise(path).equivalent_loads] == [(4.928e6, -0.00123)]
+    text = logs("info", path)[1]
+    assert "m = 10" in text and "4928" in text and "-1.2e-03" in text, "kN.m, as a person reads it"
+    assert "nrmse_max" in text and "nrmse_edge" not in text
+    text = logs("info", "--all", path)[1]
+    assert "m = 10" not in text and f"del_{load}" in text and "4928000.0" in text and "nrmse_edge" in text
+
+
 def test_info_of_a_cut_log_tells_what_is_there_and_that_it_is_damaged(log_path):
     os.truncate(log_path, log_path.stat().st_size // 2)
     code, text = logs("info", log_path)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -86,6 +88,19 @@ def test_summary_has_all_that_viewers_need(log_path):
     assert [summary.count(k) for k in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS)] == [4, 4, 1]
     assert summary.count(Opcode.CHUNK_INDEX) == kinds.count(Opcode.CHUNK)
     assert summary.count(Opcode.SUMMARY_OFFSET) == 6
+
+
+def test_rerun_finds_nothing_wrong_with_it(log_path):
+    rerun = shutil.which(
+        "rerun", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    )
+    if rerun is None:
+        pytest.skip("rerun is not installed: pip install 'fatigue-runner[view]'")
+    done = subprocess.run(
+        [rerun, "mcap", "check", "--full", log_path], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("ok ") == 4, done.stdout
 
 
 _NODE_SCRIPT = """

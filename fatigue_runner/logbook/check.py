@@ -17,7 +17,14 @@ from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.files import read_bytes
 from fatigue_runner.logbook.metadata import read_summary
 from fatigue_runner.logbook.reader import row_layout
-from fatigue_runner.logbook.records import Damage, Record, message_entries, open_chunk, parse
+from fatigue_runner.logbook.records import (
+    Damage,
+    Record,
+    message_entries,
+    open_chunk,
+    parse,
+    parse_message_index,
+)
 
 
 @dataclass
@@ -94,10 +101,10 @@ def _chunk_index(
         problems.append(f"a chunk's times are not those of its messages (at byte {record.start})")
     places: dict[int, int] = {}
     for index_record in indexes:
-        index = parse(index_record)
-        places[index.channel_id] = index_record.start
-        expected = entries.get(index.channel_id, np.empty((0, 3)))[:, :2].tolist()
-        if sorted(map(list, index.records)) != sorted(expected):
+        channel_id, found = parse_message_index(index_record)
+        places[channel_id] = index_record.start
+        expected = entries.get(channel_id, np.empty((0, 3)))[:, :2]
+        if not np.array_equal(found[found[:, 1].argsort()], expected):
             problems.append(f"a message index is wrong (at byte {index_record.start})")
     if set(entries) - set(places):
         problems.append(f"a chunk lacks message indexes (at byte {record.start})")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -27,28 +28,35 @@ app = typer.Typer(
 LogPath = Annotated[Path, typer.Argument(help="A log (.mcap).", show_default=False)]
 # Stretches of rejected steps that `info` lists; the longest tell most.
 _SHOWN_STRETCHES = 8
-_EXTREMES_WIDTH = 100
+_WIDTH = 130
 
 
 @app.command()
-def info(log: LogPath) -> None:
+def info(
+    log: LogPath,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Print every entry of the result as it is.")
+    ] = False,
+) -> None:
     """Print what ran, with what, how often the corrector was accepted, where not, and the extremes.
 
     Examples:
 
-        fatigue-runner logs info runs/quickstart/logs/w03-heun-10ms.mcap
+        fatigue-runner logs info runs/quickstart/logs/v08.00_kv0.10_heun_10ms.mcap
     """
     console = Console()
+    # A cut number would be a wrong one: rather let a narrow terminal wrap the lines.
+    console.width = max(console.width, _WIDTH)
     summary = summarise(log)
-    _print_head(console, summary)
+    _print_head(console, summary, everything)
     _print_acceptance(console, summary)
+    if summary.equivalent_loads and not everything:
+        console.print(_equivalent_loads_table(summary))
     if summary.extremes:
-        # A cut number would be a wrong one: rather let a narrow terminal wrap the lines.
-        console.width = max(console.width, _EXTREMES_WIDTH)
         console.print(_extremes_table(summary))
 
 
-def _print_head(console: Console, summary: LogSummary) -> None:
+def _print_head(console: Console, summary: LogSummary, everything: bool) -> None:
     rate = f", {summary.rate:g} rows per second" if summary.rate else ""
     console.print(f"[bold]{escape(str(summary.path))}[/]", soft_wrap=True)
     console.print(
@@ -57,22 +65,57 @@ def _print_head(console: Console, summary: LogSummary) -> None:
     )
     if summary.lost:
         console.print(f"[red]damaged:[/] {escape(summary.lost)}", soft_wrap=True)
-    for title, entries in (("run", summary.run), ("result", summary.result)):
-        table = Table("", "", title=title, show_header=False, title_justify="left", box=None)
-        for key, value in entries.items():
-            if value != "" and not _is_extreme(key):
-                table.add_row(escape(key), escape(value))
-        if table.row_count:
-            console.print(table)
+    _print_entries(console, "run", summary.run)
+    result = summary.result
+    if not everything:
+        result = {k: v for k, v in result.items() if k not in summary.run and not _is_told_elsewhere(k)}
+    _print_entries(console, "result", result)
     if summary.attachments:
         names = ", ".join(f"{name} ({size} bytes)" for name, size in summary.attachments.items())
         console.print(f"attached: {escape(names)}", soft_wrap=True)
 
 
-def _is_extreme(key: str) -> bool:
-    """Whether a campaign's result repeats what the table of extremes shows."""
-    kind, _, name = key.partition("_")
-    return kind in ("mean", "min", "max") and name in channels.BY_NAME
+def _print_entries(console: Console, title: str, entries: Mapping[str, str]) -> None:
+    entries = {key: value for key, value in entries.items() if value != ""}
+    if entries:
+        console.print(f"[italic]{title}[/]")
+    width = max(map(len, entries), default=0)
+    for key, value in entries.items():
+        console.print(f"  {escape(key):{width}}  {escape(value)}", soft_wrap=True)
+
+
+def _is_told_elsewhere(key: str) -> bool:
+    """Whether `info` shows an entry of a campaign's result in a table, or a summary of it (`nrmse_max`)."""
+    if key.startswith(("del_", "damage_ratio_")) or key == "rows":
+        return True
+    return (
+        key.partition("_")[0] in ("mean", "min", "max", "nrmse") and key.partition("_")[2] in channels.BY_NAME
+    )
+
+
+def _equivalent_loads_table(summary: LogSummary) -> Table:
+    found = {(e.channel, e.exponent): e for e in summary.equivalent_loads}
+    exponents = list(dict.fromkeys(e.exponent for e in summary.equivalent_loads))
+    table = _table("damage-equivalent loads, relative error against the reference", "channel", "unit")
+    for exponent in exponents:
+        table.add_column(f"m = {exponent}", justify="right")
+        table.add_column("error", justify="right")
+    for channel in dict.fromkeys(e.channel for e in summary.equivalent_loads):
+        known = channels.BY_NAME[channel]
+        cells = [channel, known.read_unit]
+        for exponent in exponents:
+            load = found.get((channel, exponent))
+            cells.append(f"{load.value * known.scale:.5g}" if load else "")
+            cells.append(f"{load.error:.1e}" if load and load.error is not None else "")
+        table.add_row(*cells)
+    return table
+
+
+def _table(title: str, *left: str) -> Table:
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 2, 0, 0))
+    for heading in left:
+        table.add_column(heading, no_wrap=True)
+    return table
 
 
 def _print_acceptance(console: Console, summary: LogSummary) -> None:
@@ -94,9 +137,7 @@ def _print_acceptance(console: Console, summary: LogSummary) -> None:
 
 
 def _extremes_table(summary: LogSummary) -> Table:
-    table = Table(title="extremes", title_justify="left", box=None, padding=(0, 2, 0, 0))
-    table.add_column("channel")
-    table.add_column("unit")
+    table = _table("extremes", "channel", "unit")
     for heading in ("min", "at s", "mean", "max", "at s"):
         table.add_column(heading, justify="right")
     for e in summary.extremes:

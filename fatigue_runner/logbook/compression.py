@@ -10,8 +10,8 @@ import zstandard
 from fatigue_runner.errors import did_you_mean
 from fatigue_runner.logbook.errors import LogError
 
-# Of a turbine in turbulence, level 1 is 3 % smaller, half as fast to write and a third as fast to read, since it
-# also entropy-codes mantissas that are noise; level 3 gains nothing more (measured).
+# Of a turbine in turbulence, level 1 is 3 % smaller, half as fast to write and a third as fast to read,
+# since it also entropy-codes mantissas that are noise; level 3 gains nothing more (measured).
 _ZSTD_LEVEL = -3
 # A damaged size must not become an allocation that stops the machine; our chunks have 1 MiB, others' rarely
 # more.

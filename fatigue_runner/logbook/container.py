@@ -43,9 +43,18 @@ def library_name() -> str:
     return f"{LIBRARY} {__version__}"
 
 
-def as_text(entries: Mapping[str, Any]) -> dict[str, str]:
-    """Metadata entries as text: floats by their shortest exact form, None as an empty string."""
-    return {str(k): "" if v is None else str(v) for k, v in entries.items()}
+def as_text(value: Any) -> str:
+    """A value as the text of a record: floats in their shortest exact form, None as an empty string.
+
+    Bytes of a file name that are no UTF-8 are written as escapes, since a record must be UTF-8.
+    """
+    text = "" if value is None else str(value)
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def as_entries(entries: Mapping[str, Any]) -> dict[str, str]:
+    """Entries of a metadata record as text."""
+    return {as_text(key): as_text(value) for key, value in entries.items()}
 
 
 def encode(*records: McapRecord) -> bytes:

@@ -115,5 +115,5 @@ class RowLayout:
 
 @lru_cache(maxsize=64)
 def layout_for(topics: tuple[Topic, ...]) -> RowLayout:
-    """The layout of rows with these topics; a campaign's logs share one, and making it takes as long as reading one."""
+    """The layout of rows with these topics; the logs of a campaign share one."""
     return RowLayout(topics)

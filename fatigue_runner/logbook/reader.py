@@ -179,12 +179,13 @@ def _take_metadata(log: Log, contents: Contents) -> None:
     log.units = contents.metadata.get("units", {})
     log.attachments = contents.attachments
     for name in ("steps", "evaluations", "clamped_lookups"):
-        setattr(log, name, int(_number(log.result, name) or 0))
-    log.wall_time = _number(log.result, "wall_time") or 0.0
-    log.diverged_at = _number(log.result, "diverged_at")
+        setattr(log, name, int(number(log.result, name) or 0))
+    log.wall_time = number(log.result, "wall_time") or 0.0
+    log.diverged_at = number(log.result, "diverged_at")
 
 
-def _number(entries: Mapping[str, str], name: str) -> float | None:
+def number(entries: Mapping[str, str], name: str) -> float | None:
+    """A metadata entry as a number, None where it is absent or none."""
     try:
         return float(entries[name])
     except (KeyError, ValueError):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from fatigue_runner import channels
-from fatigue_runner.logbook.reader import Log, read_log
+from fatigue_runner.logbook.reader import Log, number, read_log
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,16 @@ class Extreme:
     time_of_minimum: float
     time_of_maximum: float
     not_finite: int = 0
+
+
+@dataclass(frozen=True)
+class EquivalentLoad:
+    """A damage-equivalent load of the result (SI) and its relative error against the reference, where known."""
+
+    channel: str
+    exponent: str
+    value: float
+    error: float | None
 
 
 @dataclass
@@ -61,6 +72,7 @@ class LogSummary:
     rejected_wind: tuple[float, float, float] | None = None
     accepted_wind: tuple[float, float, float] | None = None
     extremes: list[Extreme] = field(default_factory=list)
+    equivalent_loads: list[EquivalentLoad] = field(default_factory=list)
 
 
 def _extreme(name: str, unit: str, values: np.ndarray, time: np.ndarray) -> Extreme | None:
@@ -107,6 +119,19 @@ def stretches(log: Log) -> list[Stretch]:
     return sorted(found, key=lambda s: (-s.intervals, s.begin))
 
 
+def equivalent_loads(result: Mapping[str, str]) -> list[EquivalentLoad]:
+    """Damage-equivalent loads of a result: `del_<channel>_m<exponent>`, with `del_error_...` beside it."""
+    found = []
+    for key in result:
+        name, _, exponent = key.removeprefix("del_").rpartition("_m")
+        if not key.startswith("del_") or name not in channels.BY_NAME:
+            continue
+        value, error = number(result, key), number(result, f"del_error_{name}_m{exponent}")
+        if value is not None:
+            found.append(EquivalentLoad(name, exponent, value, error))
+    return found
+
+
 def _quantiles(values: np.ndarray) -> tuple[float, float, float] | None:
     if not values.size:
         return None
@@ -133,6 +158,7 @@ def summarise(path: str | os.PathLike[str]) -> LogSummary:
         complete=log.complete,
         lost=log.lost,
         extremes=extremes(log),
+        equivalent_loads=equivalent_loads(log.result),
     )
     # Without a threshold nothing was tested, and "100 % accepted" would praise a plain Runge-Kutta method.
     guarded = log.accepted.size and not (np.isnan(log.threshold).all() and log.accepted.all())

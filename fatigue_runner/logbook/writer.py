@@ -22,7 +22,7 @@ from mcap.records import Attachment, Channel, Schema
 
 from fatigue_runner.logbook.columns import columns, topics_of
 from fatigue_runner.logbook.compression import compressor
-from fatigue_runner.logbook.container import Container, as_text, library_name
+from fatigue_runner.logbook.container import Container, as_entries, as_text, library_name
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.files import open_exclusively, part_of, publish, write_errors
 from fatigue_runner.logbook.layout import RowLayout, layout_for
@@ -92,10 +92,10 @@ class LogWriter:
     def _write_preface(self, run: Mapping[str, Any], attachments: Mapping[str, bytes]) -> None:
         with self._writing():
             self._container = Container(self._file, library_name())
-            self._container.metadata("run", {"log_schema": SCHEMA_VERSION, **as_text(run)})
+            self._container.metadata("run", {"log_schema": SCHEMA_VERSION, **as_entries(run)})
             for name, data in attachments.items():
                 media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
-                self._container.attachment(Attachment(0, 0, name, media_type, bytes(data)))
+                self._container.attachment(Attachment(0, 0, as_text(name), media_type, bytes(data)))
             self._file.flush()
 
     @contextmanager
@@ -221,7 +221,7 @@ class LogWriter:
     def _full_result(self) -> dict[str, str]:
         status = "done" if self._diverged_at is None else "diverged"
         counted = {"status": status, "diverged_at": self._diverged_at, **self._totals}
-        return as_text({**counted, **self.result, "rows": self.rows})
+        return as_entries({**counted, **self.result, "rows": self.rows})
 
     def finish(self) -> None:
         """Write the last chunk, `result` and summary; fsync and rename. The end of a `with` block does it."""
