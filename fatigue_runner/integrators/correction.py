@@ -61,12 +61,13 @@ def features(x, k, stage_rows, h, ratio, start, middle, end, rows):
 
 
 @njit(**FAST)
-def times_azimuth(count, rows):
-    """Append rows 0..count times sin and times cos of the azimuth (rows 25 and 26)."""
-    for i in range(count):
-        for j in range(LANES):
-            rows[(count + i) * LANES + j] = rows[i * LANES + j] * rows[25 * LANES + j]
-            rows[(2 * count + i) * LANES + j] = rows[i * LANES + j] * rows[26 * LANES + j]
+def multiply(count, factors, rows):
+    """Append rows 0..count times row `factors[i]`, for every i."""
+    for f in range(len(factors)):
+        first, factor = (f + 1) * count * LANES, factors[f] * LANES
+        for i in range(count):
+            for j in range(LANES):
+                rows[first + i * LANES + j] = rows[i * LANES + j] * rows[factor + j]
 
 
 @intrinsic
@@ -169,10 +170,11 @@ def activate(values, count, kind):
 def correction(x, k, stage_rows, h, start, middle, end, network, rows, hidden, out):
     """out (16, LANES) = linear part of the features plus a network of the features: the learned defect of the step.
 
-    network = (raw, ratio, products, linear weights, net weights, sizes, activation): weights as `pack` orders them, one layer
-    after the other; sizes = inputs and outputs of the layers, each with its row of ones; empty where there is no such part.
+    network = (raw, ratio, factors, linear weights, net weights, sizes, activation): the linear part sees all rows, and all rows
+    times each row of `factors`; weights as `pack` orders them, one layer after the other; sizes = outputs of the layers behind a 0;
+    empty where there is no such part.
     """
-    raw, ratio, products, linear, net, sizes, activation = network
+    raw, ratio, factors, linear, net, sizes, activation = network
     if raw:
         raw_features(x, start, rows)
         count = RAW_ROWS
@@ -180,9 +182,9 @@ def correction(x, k, stage_rows, h, start, middle, end, network, rows, hidden, o
         features(x, k, stage_rows, h, ratio, start, middle, end, rows)
         count = FIXED_ROWS + 8 * len(stage_rows)
     inputs = count
-    if products:
-        times_azimuth(count, rows)
-        inputs = 3 * count
+    if len(factors) > 0:
+        multiply(count, factors, rows)
+        inputs = (1 + len(factors)) * count
     if len(linear) > 0:
         dense(rows, linear, inputs, 2, out)
     else:
