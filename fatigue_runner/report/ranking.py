@@ -231,17 +231,16 @@ def answer(summaries: Sequence[MethodSummary], levels: Sequence[float] = LEVELS)
 def _nearest_sentence(tested: list[MethodSummary], level: float) -> str:
     nearest = min((s for s in tested if _competes(s)), key=_error_size)
     return (
-        f"No integrator is within {format_percent(level)} DEL error; the nearest is {nearest.label} "
-        f"with {_worst(nearest)}."
+        f"No integrator is within {format_percent(level)} DEL error; the nearest is {nearest.label} with "
+        f"{_worst(nearest)}."
     )
 
 
 def _best_sentence(best: MethodSummary, levels: list[float], reference: MethodSummary | None) -> str:
     within = " and within ".join(format_percent(level) for level in levels)
     return (
-        f"Cheapest within {within} DEL error: {best.label}, "
-        f"{_count(best.evaluations_per_second)} evaluations per simulated second{_saving(best, reference)}; "
-        f"its worst is {_worst(best)}."
+        f"Cheapest within {within} DEL error: {best.label}, {_count(best.evaluations_per_second)} "
+        f"evaluations per simulated second{_saving(best, reference)}; its worst is {_worst(best)}."
     )
 
 

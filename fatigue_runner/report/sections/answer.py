@@ -35,12 +35,11 @@ def build(run: Run) -> Section:
 
 
 CAPTION = (
-    "Cheapest first. Cost: evaluations of the equations of motion, and the measured wall-clock time of the "
-    "integration alone, "
-    "medians over the finished cases. Errors against the reference of the same wind; DEL errors over all "
-    "channels, Wöhler exponents "
-    "and winds. ● on the Pareto front: nothing else is both cheaper and better. Shaded: the cheapest at each "
-    "level."
+    "Cheapest first. Cost: evaluations of the equations of motion, the same on every machine, and the measured "
+    "wall-clock time of the integration alone, which suffers from other load on the machine; medians over the "
+    "finished cases. Errors against the reference of the same wind; DEL errors over all channels, Wöhler "
+    "exponents and winds. ● on the Pareto front: nothing else is both cheaper and better. Shaded: the cheapest "
+    "at each level."
 )
 
 

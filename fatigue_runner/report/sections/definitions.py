@@ -64,17 +64,17 @@ def _del(run: Run) -> str:
     counted = _counted(run)
     cycles = "" if counted is None else f" = {counted:g} cycles"
     return (
-        "DEL = (Σ nᵢ Sᵢᵐ / N_eq)^(1/m): the constant load range S that in N_eq cycles does the damage of all "
-        "counted ranges Sᵢ "
-        f"(peak to peak), nᵢ times each. Short-term: N_eq = 1 Hz × counted duration{cycles}."
+        "DEL = (Σ nᵢ Sᵢᵐ / N_eq)^(1/m): the constant load range S that in N_eq cycles does the damage of "
+        "all counted ranges Sᵢ (peak to peak), nᵢ times each. Short-term: N_eq = 1 Hz × counted "
+        f"duration{cycles}."
     )
 
 
 def _counting(run: Run) -> str:
     residue = str(run.setting("fatigue.residue", "half"))
     return (
-        "Rainflow, three-point, as ASTM E1049; ranges unbinned, no mean-stress correction; "
-        f"the residue is {RESIDUES.get(residue, residue)}."
+        "Rainflow, three-point, as ASTM E1049; ranges unbinned, no mean-stress correction; the residue is "
+        f"{RESIDUES.get(residue, residue)}."
     )
 
 
@@ -90,8 +90,7 @@ def _reference(run: Run) -> str:
         return "None was run."
     return (
         f"{run.reference.label}: the same wind, initial state, turbine and compiled kernel; only the "
-        "integrator differs. "
-        "What the reference itself gets wrong is in no figure here."
+        "integrator differs. What the reference itself gets wrong is in no figure here."
     )
 
 

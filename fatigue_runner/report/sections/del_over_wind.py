@@ -43,12 +43,10 @@ def build(run: Run) -> Section:
         return Section(title, [Paragraph("Not drawn: the results hold no damage-equivalent loads.")])
     shown = shown_integrators(run)
     caption = (
-        "Short-term DEL of each channel (above; the exponent customary for its material) and the size of its "
-        "relative error against "
-        "the reference of the same wind (below). Where a wind speed was run more than once, the line is the "
-        "power mean and the error "
-        "the largest. Grey line below, where there are seeds enough: standard deviation of the reference's "
-        "DEL between seeds, "
+        "Short-term DEL of each channel (above; the exponent customary for its material) and the size of "
+        "its relative error against the reference of the same wind (below). Where a wind speed was run more "
+        "than once, the line is the power mean and the error the largest. Grey line below, where there are "
+        "seeds enough: standard deviation of the reference's DEL between seeds, "
         "relative to its mean." + left_out(run, shown)
     )
     return Section(

@@ -45,10 +45,8 @@ def build(run: Run) -> Section:
     lost = [s.label for s in run.integrators if not s.complete]
     caption = (
         "Each point is one integrator: its worst DEL error over all channels, Wöhler exponents and winds, "
-        "over its cost per simulated "
-        "second, counted (left) and measured (right); the thin stem ends at its median DEL error. Filled, on "
-        "the grey line: the Pareto "
-        "front of each panel. "
+        "over its cost per simulated second, counted (left) and measured (right); the thin stem ends at its "
+        "median DEL error. Filled, on the grey line: the Pareto front of each panel. "
         + (f"Not drawn, since cases diverged or failed: {', '.join(lost)}." if lost else "")
     )
     return Section(title, [Figure(_draw(run, drawn), caption.strip(), "Worst DEL error over cost, log-log")])

@@ -39,8 +39,7 @@ def build(run: Run) -> Section:
     shown = shown_integrators(run)
     caption = (
         f"Tower-top fore-aft displacement x_FA at {len(winds)} winds of the campaign (above), and its "
-        "distance from the reference "
-        f"{run.reference.label} (below; running maximum over {ENVELOPE:g} s). "
+        f"distance from the reference {run.reference.label} (below; running maximum over {ENVELOPE:g} s). "
         "A curve that ends in × diverged there." + left_out(run, shown)
     )
     return Section(

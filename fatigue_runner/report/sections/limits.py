@@ -41,8 +41,8 @@ def _clamped(run: Run) -> list[str]:
     total = sum(count for _, count in clamped)
     return [
         f"{len(clamped)} of {len(run.rows)} cases left the range of the aerodynamic tables ({total:.0f} "
-        f"look-ups in all{at}). "
-        "Outside it the nearest tabulated value is taken: the loads there are not those of the turbine."
+        f"look-ups in all{at}). Outside it the nearest tabulated value is taken: the loads there are not "
+        "those of the turbine."
     ]
 
 
@@ -53,8 +53,7 @@ def _lost(run: Run) -> list[str]:
             share = format_percent(lost_probability(rows_of(run, s.key)))
             items.append(
                 f"{s.label}: {s.cases - s.done} of {s.cases} cases did not finish; {share} of the "
-                "probability is lost "
-                "and no damage is counted for it. The cases are listed below."
+                "probability is lost and no damage is counted for it. The cases are listed below."
             )
     return items
 
@@ -76,8 +75,7 @@ def _short(run: Run) -> list[str]:
         return []
     return [
         f"Each case counts {counted:g} s; IEC 61400-1 asks for {SHORT:g} s. That is enough to compare "
-        "integrators under the same "
-        "wind, and too little for a design load."
+        "integrators under the same wind, and too little for a design load."
     ]
 
 
