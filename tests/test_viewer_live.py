@@ -157,15 +157,18 @@ def started(folder: Path, port: int, **told: object) -> subprocess.Popen[bytes]:
 def test_bridge_ends_with_the_run_when_there_is_no_viewer(tmp_path):
     process = started(tmp_path, window.free_port())
     live.finish(process)
-    assert process.returncode == 0
+    assert process.wait(timeout=60) == 0
 
 
-def test_bridge_that_does_not_answer_is_ended(tmp_path, monkeypatch):
-    monkeypatch.setattr(live, "END_SECONDS", 0.2)
+def test_run_waits_for_no_bridge_that_does_not_answer(tmp_path):
     process = started(tmp_path, window.free_port())
     os.kill(process.pid, signal.SIGSTOP)
-    live.finish(process)
-    assert process.returncode == -signal.SIGKILL
+    try:
+        live.finish(process)
+        assert process.poll() is None
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_bridge_that_stands_still_ends_itself_even_inside_a_call_that_never_returns():
@@ -216,17 +219,19 @@ class TestRun:
     def test_viewer_open_shows_the_campaign_and_the_turbine(self, unwatched, tmp_path):
         from viewer_pictures import near, part, screen, warm
 
+        from fatigue_runner.viewer import colours
+
         port = window.free_port()
         with screen(port=port) as viewer:
             assert run(tmp_path / "run", live.watcher(port=port)) == unwatched
-            picture = viewer.soon()
-        assert warm(part(picture, 0.0, 0.6, 0.05, 0.6)).sum() > 800, "blades"
-        from fatigue_runner.viewer import colours
-
-        chart_ = part(picture, 0.6, 1.0, 0.5, 1.0)
-        assert sum(near(chart_, c, 25).sum() for c in (*colours.INTEGRATORS[:2], colours.REFERENCE)) > 60, (
-            "DELs"
-        )
+            for _ in range(30):  # what is sent is drawn soon
+                picture = viewer.soon()
+                blades = warm(part(picture, 0.0, 0.6, 0.05, 0.6)).sum()
+                drawn = part(picture, 0.6, 1.0, 0.55, 0.85)
+                dots = min(near(drawn, c, 25).sum() for c in (colours.INTEGRATORS[1], colours.REFERENCE))
+                if blades > 800 and dots > 20:
+                    return
+        pytest.fail(f"{blades} pixels of blades, {dots} of DELs")
 
     def test_viewer_absent(self, unwatched, tmp_path):
         assert run(tmp_path / "run", live.watcher(port=window.free_port())) == unwatched
@@ -249,7 +254,7 @@ class TestRun:
         with window.viewer("--serve-grpc", "--port", str(port)) as process:
             wait_for(port)
             playing = started(tmp_path, port, pace=1.0)
-            live.finish(playing, wait=False)
+            live.finish(playing)
             time.sleep(3.0)
             assert playing.poll() is None, "it plays on beyond the end of the run"
             process.kill()
@@ -262,8 +267,8 @@ class TestRun:
             wait_for(port)
             os.kill(process.pid, signal.SIGSTOP)
             try:
-                playing = started(tmp_path, port, pace=1e4)
-                live.finish(playing, wait=False)
+                playing = started(tmp_path, port, pace=1e4, stall=5.0)
+                live.finish(playing)
                 playing.wait(timeout=60)
             finally:
                 os.kill(process.pid, signal.SIGCONT)

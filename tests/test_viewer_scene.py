@@ -166,3 +166,12 @@ def test_light_rises_along_both_scales():
     for scale in (colours.FLAP_SCALE, colours.WIND_SCALE):
         light = [0.2126 * r + 0.7152 * g + 0.0722 * b for r, g, b in scale]
         assert light == sorted(light)
+
+
+def test_normals_of_a_surface_of_revolution_point_away_from_its_axis():
+    x = np.linspace(0.0, 4.0, 5)
+    vertices, triangles = shapes.revolved(x, np.full(5, 2.0), sides=24)
+    normal = shapes.normals(vertices[None], triangles)[0]
+    middle = slice(24, 72)  # the rings that are not at an end
+    outwards = vertices[middle] * [0.0, 0.5, 0.5]
+    assert np.abs(np.einsum("ij,ij->i", normal[middle], outwards)) == pytest.approx(1.0, abs=0.02)

@@ -9,7 +9,8 @@ import rerun.blueprint as rrb
 
 from fatigue_runner import channels
 from fatigue_runner.viewer.cases import Viewed
-from fatigue_runner.viewer.recording import TIMELINE, read_unit
+from fatigue_runner.viewer.recording import TIMELINE
+from fatigue_runner.viewer.styles import read_unit
 
 LONGEST_WHOLE = 180.0  # s; oscillations of a longer log would be a solid band
 _BACKGROUND = [24, 28, 36]
@@ -81,11 +82,12 @@ def overview(cases: Sequence[Viewed]) -> rrb.Container:
     plots = [
         _plot("Blade root flapwise moment [MN·m]", cases, _blades("load", "root_flapwise_moment", cases)),
         _plot("Tower-base fore-aft moment [MN·m]", cases, ["load/tower_base_fore_aft_moment"]),
-        *_solver_plots(cases)[:2],
     ]
+    solver = _solver_plots(cases)
     if len(cases) > 1 and any(_has(case, "reference_error") for case in cases):
-        # curves of good integrators lie on each other: their errors do not
-        plots[3:] = [_error_plot(cases)]
+        # Curves of good integrators lie on each other; their errors do not.
+        solver = [_error_plot(cases), *solver[: int(any(case.is_guarded for case in cases))]]
+    plots += solver[:2]
     if len(plots) < 4:
         plots.append(_plot("Wind speed at the hub [m/s]", cases[:1], ["wind/wind_speed"]))
     if len(plots) < 4:
@@ -103,7 +105,7 @@ def scene_view(cases: Sequence[Viewed]) -> rrb.Spatial3DView:
     if len(cases) == 1:
         target, away, aside = [0.0, 10.0, 0.78 * shape.hub_height], 3.2 * shape.radius, 0.62
     else:
-        away, aside = shape.radius * (2.2 + 0.55 * (len(cases) - 1)), 0.25
+        away, aside = shape.radius * (1.9 + 0.55 * (len(cases) - 1)), 0.18
         target = [0.0, middle + 20.0, 0.80 * shape.hub_height]
     eye = [-away * (1 - aside**2) ** 0.5, target[1] - 10.0 + aside * away, 0.75 * shape.hub_height]
     return rrb.Spatial3DView(

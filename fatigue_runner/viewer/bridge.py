@@ -1,8 +1,8 @@
 """The process between a running campaign and the viewer: `python -m fatigue_runner.viewer.bridge TOLD.json`.
 
-It only reads: records and logs of the run folder, as they grow. It takes processor time that nobody else wants, and ends by
-itself: when the run is over (its standard input closes) and all is sent or played, when the viewer is gone, or when sending has
-stood still for `STALL_SECONDS`, which is how a stopped viewer shows.
+It only reads: records and logs of the run folder, as they grow. It has the lowest priority, and ends by itself: when the run is
+over (its standard input closes) and all is sent or played, when the viewer is gone, or when sending has stood still for a while,
+which is how a stopped viewer shows.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from fatigue_runner.viewer.cases import Viewed, as_viewed
 from fatigue_runner.viewer.live import Watched
 from fatigue_runner.viewer.overview import CHART, Overview, chart
 
-STALL_SECONDS = 10.0
 LOOK_SECONDS = 0.05
 OVERVIEW_SECONDS = 0.4  # between two pictures of the campaign
 CONNECT_SECONDS = 30.0
+START_SECONDS = 300.0  # loading Rerun at the lowest priority beside busy workers can take a minute
 
 _STATUS = ("accepted", "discrepancy", "threshold", "local_error", "reference_error")
 
@@ -184,7 +184,7 @@ def main(path: str) -> None:
     told = Watched(**json.loads(Path(path).read_text(encoding="utf-8")))
     Path(path).unlink(missing_ok=True)
     _yield_to_others()
-    heartbeat(CONNECT_SECONDS)
+    heartbeat(START_SECONDS)
     port = told.port or window.free_port()
     # Inherits the low priority: the run comes first, and on a machine with time to spare it makes no difference.
     process = None if told.port else window.start_viewer("--port", str(port))
@@ -201,7 +201,7 @@ def main(path: str) -> None:
     bridge = Bridge(told, recording)
     over, looked = False, time.monotonic()
     while True:
-        heartbeat(STALL_SECONDS)
+        heartbeat(told.stall)
         now = time.monotonic()
         over = over or run_is_over()
         if not bridge.step(now, over):
@@ -211,7 +211,7 @@ def main(path: str) -> None:
             if not listens(port):
                 return
         time.sleep(LOOK_SECONDS)
-    recording.flush(timeout_sec=STALL_SECONDS / 2)
+    recording.flush(timeout_sec=told.stall / 2)
 
 
 def heartbeat(seconds: float) -> None:
@@ -242,7 +242,7 @@ def listens(port: int) -> bool:
 
 def _answers(port: int, process: Any) -> bool:
     """Wait for the viewer; False where there is none to wait for."""
-    until = time.monotonic() + CONNECT_SECONDS / 2
+    until = time.monotonic() + CONNECT_SECONDS
     while time.monotonic() < until:
         if listens(port):
             return True
@@ -253,11 +253,9 @@ def _answers(port: int, process: Any) -> bool:
 
 
 def _yield_to_others() -> None:
-    """Take processor time only where the run leaves some."""
+    """The lowest ordinary priority: beside a busy worker it is 1.5 % of a core, on a machine with time to spare all it needs."""
     with contextlib.suppress(OSError, AttributeError):
         os.nice(19)
-    with contextlib.suppress(OSError, AttributeError):
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
 
 
 if __name__ == "__main__":

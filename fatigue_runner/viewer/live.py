@@ -21,8 +21,6 @@ from typing import Any
 from fatigue_runner.errors import InputError
 from fatigue_runner.viewer.window import require_display, require_rerun
 
-END_SECONDS = 5.0  # for the bridge to send the rest after the run
-
 
 @dataclass
 class Watched:
@@ -36,6 +34,7 @@ class Watched:
     case: str | None = None
     scale: float = 1.0
     port: int | None = None
+    stall: float = 30.0  # s without an answer of the viewer after which the bridge ends
 
 
 def watcher(
@@ -70,7 +69,7 @@ def watcher(
         try:
             yield
         finally:
-            finish(bridge, wait=pace is None)
+            finish(bridge)
 
     return watch
 
@@ -90,16 +89,9 @@ def start(told: Watched) -> subprocess.Popen[bytes]:
     )
 
 
-def finish(bridge: subprocess.Popen[bytes], wait: bool = True) -> None:
-    """Tell the bridge that the run is over. wait: give it `END_SECONDS` to send the rest, then end it; else leave it to play
-    on: it ends with the case, with the viewer, or when that does not answer."""
+def finish(bridge: subprocess.Popen[bytes]) -> None:
+    """Tell the bridge that the run is over, and wait for nothing: it sends or plays the rest, and ends by itself with that,
+    with the viewer, or when the viewer does not answer."""
     if bridge.stdin is not None:
         with contextlib.suppress(OSError):
             bridge.stdin.close()
-    if not wait:
-        return
-    try:
-        bridge.wait(timeout=END_SECONDS)
-    except subprocess.TimeoutExpired:
-        bridge.kill()  # a stopped viewer holds it in the middle of sending
-        bridge.wait()

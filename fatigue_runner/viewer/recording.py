@@ -16,6 +16,7 @@ from fatigue_runner import channels
 from fatigue_runner.viewer import colours, shapes
 from fatigue_runner.viewer.cases import Viewed
 from fatigue_runner.viewer.scene import local_wind
+from fatigue_runner.viewer.styles import SOLVER_SERIES, read_unit, set_style
 
 TIMELINE = "time"
 FRAME_RATE = 20.0  # Hz, of the 3-D scene; series keep the log's rate
@@ -41,7 +42,7 @@ class Stage:
         self._log("scene", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         for case in self.cases:
             self._set_up_scene(case)
-            _series_style(self.recording, case, len(self.cases) > 1)
+            set_style(self.recording, case, len(self.cases) > 1)
         self._legend()
 
     def _log(self, path: str, what: Any) -> None:
@@ -67,7 +68,7 @@ class Stage:
                     vertex_positions=skin[0],
                     triangle_indices=skin[1],
                     albedo_factor=colour,
-                    vertex_normals=normals(skin[0][None], skin[1])[0],
+                    vertex_normals=shapes.normals(skin[0][None], skin[1])[0],
                 ),
             )
         for blade in (1, 2, 3):
@@ -195,7 +196,7 @@ class Stage:
         n, count = vertices.shape[:2]
         surface = rr.Mesh3D.columns(
             vertex_positions=vertices.reshape(-1, 3),
-            vertex_normals=normals(vertices, triangles).reshape(-1, 3),
+            vertex_normals=shapes.normals(vertices, triangles).reshape(-1, 3),
         ).partition([count] * n)
         tint = () if shade is None else rr.Mesh3D.columns(albedo_factor=shade)
         self._columns(path, time, surface, tint)
@@ -253,33 +254,9 @@ class Stage:
             self._columns(path, time, rr.Scalars.columns(scalars=np.asarray(values, float)))
 
 
-SOLVER_SERIES = ("discrepancy", "threshold", "local_error", "reference_error")
-
-
 def nanoseconds(time: np.ndarray) -> np.ndarray:
     """Times [s] as timedelta64[ns]."""
     return np.round(np.asarray(time) * 1e9).astype("timedelta64[ns]")
-
-
-def read_unit(name: str) -> tuple[str, float]:
-    """Unit in which a load is drawn, and the factor to it: MN·m for moments, else as `channels` says."""
-    if name.endswith("moment") or name == "low_speed_shaft_torque":
-        return "MN·m", 1e-6
-    channel = channels.BY_NAME.get(name)
-    return (channel.read_unit, channel.scale) if channel else ("", 1.0)
-
-
-def normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (n, vertices, 3) of moving surfaces (n, vertices, 3), averaged over the adjoining triangles."""
-    corner = vertices[:, triangles]
-    face = np.cross(corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0])
-    out = np.zeros_like(vertices)
-    for i in range(3):
-        order = np.argsort(triangles[:, i], kind="stable")
-        which, start = np.unique(triangles[order, i], return_index=True)
-        out[:, which] += np.add.reduceat(face[:, order], start, axis=1)
-    length = np.linalg.norm(out, axis=-1, keepdims=True)
-    return (out / np.where(length > 0, length, 1.0)).astype(np.float32)
 
 
 def _flap(case: Viewed) -> np.ndarray:
@@ -313,34 +290,3 @@ def _range(values: Sequence[np.ndarray]) -> tuple[float, float]:
     known = [v[np.isfinite(v)] for v in values]
     known = [v for v in known if v.size]
     return (min(v.min() for v in known), max(v.max() for v in known)) if known else (np.nan, np.nan)
-
-
-def _series_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> None:
-    """Names and colours of all series of a case: by integrator where there are several, else by blade."""
-    groups = [("state", c) for c in channels.STATES] + [("wind", c) for c in channels.WIND_SIGNALS]
-    groups += [("load", channels.BY_NAME[n]) for n in case.log.loads if n in channels.BY_NAME]
-    for group, channel in groups:
-        blade = next((i for i in (1, 2, 3) if channel.name.startswith(f"blade{i}")), None)
-        colour, name = case.colour, case.label
-        if not several:
-            name = channel.label
-            colour = colours.BLADES[blade - 1] if blade else colours.INTEGRATORS[0]
-        style = rr.SeriesLines(names=name, colors=colour, widths=1.6 if not case.is_reference else 2.6)
-        recording.log(f"plots/{group}/{channel.name}/{case.key}", style, static=True)
-    for name, what, colour in (
-        ("discrepancy", "discrepancy", case.colour), ("threshold", "threshold", colours.REJECTED),
-        ("local_error", "local error estimate", case.colour), ("reference_error", "error", case.colour),
-    ):  # fmt: skip
-        recording.log(
-            f"plots/solver/{name}/{case.key}",
-            rr.SeriesLines(names=f"{case.label}: {what}" if several else what, colors=colour, widths=1.6),
-            static=True,
-        )
-    if case.is_guarded:
-        recording.log(
-            f"plots/solver/accepted/{case.key}",
-            rr.SeriesPoints(
-                names=f"{case.label}: accepted" if several else "accepted", markers="square", marker_sizes=7.0
-            ),
-            static=True,
-        )

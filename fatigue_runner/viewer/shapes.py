@@ -143,3 +143,16 @@ def disc_points(geometry: Geometry, rings: int = 7, sides: int = 36) -> tuple[Ar
     r = geometry.radius * np.linspace(1e-3, 1.0, rings)
     points = np.stack([r[:, None] * np.cos(angle), r[:, None] * np.sin(angle)], axis=-1).reshape(-1, 2)
     return points, tube_triangles(rings, sides)[: 2 * sides * (rings - 1)]
+
+
+def normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (n, vertices, 3) of moving surfaces (n, vertices, 3), averaged over the adjoining triangles."""
+    corner = vertices[:, triangles]
+    face = np.cross(corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0])
+    out = np.zeros_like(vertices)
+    for i in range(3):
+        order = np.argsort(triangles[:, i], kind="stable")
+        which, start = np.unique(triangles[order, i], return_index=True)
+        out[:, which] += np.add.reduceat(face[:, order], start, axis=1)
+    length = np.linalg.norm(out, axis=-1, keepdims=True)
+    return (out / np.where(length > 0, length, 1.0)).astype(np.float32)

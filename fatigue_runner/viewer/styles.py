@@ -1,0 +1,50 @@
+"""How series look in the plots: names, colours, units."""
+
+from __future__ import annotations
+
+import rerun as rr
+
+from fatigue_runner import channels
+from fatigue_runner.viewer import colours
+from fatigue_runner.viewer.cases import Viewed
+
+SOLVER_SERIES = ("discrepancy", "threshold", "local_error", "reference_error")
+
+
+def read_unit(name: str) -> tuple[str, float]:
+    """Unit in which a load is drawn, and the factor to it: MN·m for moments, else as `channels` says."""
+    if name.endswith("moment") or name == "low_speed_shaft_torque":
+        return "MN·m", 1e-6
+    channel = channels.BY_NAME.get(name)
+    return (channel.read_unit, channel.scale) if channel else ("", 1.0)
+
+
+def set_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> None:
+    """Names and colours of all series of a case: by integrator where there are several, else by blade."""
+    groups = [("state", c) for c in channels.STATES] + [("wind", c) for c in channels.WIND_SIGNALS]
+    groups += [("load", channels.BY_NAME[n]) for n in case.log.loads if n in channels.BY_NAME]
+    for group, channel in groups:
+        blade = next((i for i in (1, 2, 3) if channel.name.startswith(f"blade{i}")), None)
+        colour, name = case.colour, case.label
+        if not several:
+            name = channel.label
+            colour = colours.BLADES[blade - 1] if blade else colours.INTEGRATORS[0]
+        style = rr.SeriesLines(names=name, colors=colour, widths=1.6 if not case.is_reference else 2.6)
+        recording.log(f"plots/{group}/{channel.name}/{case.key}", style, static=True)
+    for name, what, colour in (
+        ("discrepancy", "discrepancy", case.colour), ("threshold", "threshold", colours.REJECTED),
+        ("local_error", "local error estimate", case.colour), ("reference_error", "error", case.colour),
+    ):  # fmt: skip
+        recording.log(
+            f"plots/solver/{name}/{case.key}",
+            rr.SeriesLines(names=f"{case.label}: {what}" if several else what, colors=colour, widths=1.6),
+            static=True,
+        )
+    if case.is_guarded:
+        recording.log(
+            f"plots/solver/accepted/{case.key}",
+            rr.SeriesPoints(
+                names=f"{case.label}: accepted" if several else "accepted", markers="square", marker_sizes=7.0
+            ),
+            static=True,
+        )
