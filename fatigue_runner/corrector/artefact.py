@@ -15,6 +15,7 @@ from fatigue_runner.corrector import features as feature_names
 from fatigue_runner.errors import InputError
 
 if TYPE_CHECKING:
+    from fatigue_runner.corrector.samples import Samples
     from fatigue_runner.turbine import Turbine
 
 Array = NDArray[np.float64]
@@ -57,8 +58,8 @@ class Guard:
 class Corrector:
     """N(x, p) of x+ = eta_h(x) + h^(p+1) N, for one turbine, method and step [s].
 
-    linear (16, k) or None acts on `features.names(kind, stages, products)`; layers: (outputs, inputs + 1) matrices, the bias first, on the
-    same features without products; their sum is h^(p+1) N divided by h^(p+1).
+    linear (16, k) or None acts on `features.names(kind, stages, factors)`; layers: (outputs, inputs + 1) matrices, the bias first, on the
+    same features without factors; their sum is h^(p+1) N divided by h^(p+1).
     """
 
     name: str
@@ -68,7 +69,7 @@ class Corrector:
     turbine: str
     turbine_hash: str
     kind: str
-    products: bool
+    factors: tuple[str, ...]
     linear: Array | None
     layers: tuple[Array, ...]
     activation: str
@@ -91,11 +92,14 @@ class Corrector:
     def _check_shapes(self) -> None:
         from fatigue_runner.corrector.samples import tableau
 
+        feature_names.factor_rows(self.factors)
+        if self.kind not in feature_names.KINDS or (self.kind == feature_names.RAW and self.factors):
+            raise CorrectorError(f"corrector {self.name}: features {self.kind!r} with factors {self.factors} do not exist")
         stages = tableau(self.method).evaluations_per_step
         base = len(feature_names.names(self.kind, stages))
         if self.linear is None and not self.layers:
             raise CorrectorError(f"corrector {self.name}: it has neither a linear part nor layers")
-        if self.linear is not None and self.linear.shape != (16, base * (3 if self.products else 1)):
+        if self.linear is not None and self.linear.shape != (16, base * (1 + len(self.factors))):
             raise CorrectorError(
                 f"corrector {self.name}: linear weights of shape {self.linear.shape} do not fit {self.method}'s features"
             )
@@ -127,13 +131,13 @@ class Corrector:
                 f"train one with `fatigue-runner train RECIPE --step {step:g}`"
             )
 
-    def predict(self, base: Array, products: Array | None = None) -> Array:
-        """Defects (n, 16) [state units] from features (n, k), and with `products` (n, 3 k) where the corrector has them."""
-        out = np.zeros((len(base), 16))
+    def predict(self, samples: Samples) -> Array:
+        """Defects (n, 16) [state units] of samples, as the kernel computes them."""
+        out = np.zeros((len(samples.plain), 16))
         if self.linear is not None:
-            out += (base if products is None else products) @ self.linear.T
+            out += samples.features(self.kind, self.factors) @ self.linear.T
         if self.layers:
-            value = base[:, 1:]
+            value = samples.features(self.kind)[:, 1:]
             for number, layer in enumerate(self.layers):
                 value = layer[:, 0] + value @ layer[:, 1:].T
                 if number < len(self.layers) - 1:
@@ -156,7 +160,8 @@ class Corrector:
             sizes.append(layer.shape[0])
         net = np.concatenate(packed) if packed else np.zeros(0)
         kind = {"identity": IDENTITY, "relu": RELU, "isru": ISRU}[self.activation]
-        return (self.kind == feature_names.RAW, ratio, self.products, linear, net, np.array(sizes), kind)
+        factors = np.array(feature_names.factor_rows(self.factors), dtype=np.int64)
+        return (self.kind == feature_names.RAW, ratio, factors, linear, net, np.array(sizes), kind)
 
     def with_guard(self, guard: Guard) -> Corrector:
         return replace(self, guard=guard)
@@ -203,7 +208,7 @@ def load(path: Path | str) -> Corrector:
         header = json.loads(metadata["header"])
         count = header.pop("layers")
         header["guard"] = Guard(**{k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()})
-        header["wind_range"] = tuple(header["wind_range"])
+        header["wind_range"], header["factors"] = tuple(header["wind_range"]), tuple(header["factors"])
         layers = tuple(tensors[f"layer{i}"].astype(float) for i in range(count))
         linear = tensors.get("linear")
         return Corrector(linear=None if linear is None else linear.astype(float), layers=layers, **header)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fatigue_runner.channels import STATE_NAMES
+from fatigue_runner.errors import InputError, did_you_mean
 
 _DEFLECTIONS = STATE_NAMES[:6]
 _RATES = (*STATE_NAMES[8:15], "shaft_twist_rate")
@@ -25,9 +26,20 @@ def raw() -> tuple[str, ...]:
     return ("one", *STATE_NAMES, "wind_speed")
 
 
-def names(kind: str, stages: int, products: bool = False) -> tuple[str, ...]:
-    """Feature names; `products` appends all of them times the sine and times the cosine of the azimuth."""
+# what the features can be multiplied with, so that the affine map may vary over a revolution and with the wind
+FACTORS = ("sin_azimuth", "cos_azimuth", "wind_speed@start", "rotor_speed")
+
+
+def names(kind: str, stages: int, factors: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Feature names; for each factor, all of them times it are appended."""
     base = raw() if kind == RAW else stage_aware(stages)
-    if not products:
-        return base
-    return (*base, *(f"{n}*sin_azimuth" for n in base), *(f"{n}*cos_azimuth" for n in base))
+    return (*base, *(f"{n}*{f}" for f in factors for n in base))
+
+
+def factor_rows(factors: tuple[str, ...]) -> tuple[int, ...]:
+    """Rows of the stage-aware features that hold the factors. Raises InputError for an unknown one."""
+    base = stage_aware(0)
+    for factor in factors:
+        if factor not in FACTORS:
+            raise InputError(f"unknown feature factor {factor!r}{did_you_mean(factor, FACTORS)}")
+    return tuple(base.index(f) for f in factors)

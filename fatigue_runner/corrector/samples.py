@@ -37,13 +37,11 @@ class Samples:
         """Exact minus plain (n, 16): what a corrector is to give."""
         return self.exact - self.plain
 
-    def features(self, kind: str, products: bool = False) -> Array:
+    def features(self, kind: str, factors: tuple[str, ...] = ()) -> Array:
         """(n, k) in the order of `features.names`."""
         base = self.raw if kind == features.RAW else self.rows
-        if not products:
-            return base
-        sine, cosine = self.rows[:, 25:26], self.rows[:, 26:27]
-        return np.concatenate([base, base * sine, base * cosine], axis=1)
+        more = [base * self.rows[:, row : row + 1] for row in features.factor_rows(factors)]
+        return np.concatenate([base, *more], axis=1) if more else base
 
 
 def wind_pieces(wind: Any, times: Array, step: float) -> Array:
