@@ -55,7 +55,12 @@ def _prune(base: Path) -> None:
 
 
 def njit(**options: Any) -> Callable[[Callable], Callable]:
-    """`numba.njit(cache=True, **options)` with the keyed cache; without a writable one it warns and compiles every time."""
+    """`numba.njit(cache=True, **options)` with the keyed cache; without a writable one it warns and compiles every time.
+
+    Strict arithmetic unless `options` say otherwise: left open, numba would compile a function with the flags of its caller, and a
+    check for NaN called from a FAST loop would be deleted.
+    """
+    options = {"fastmath": False, **options}
 
     def decorate(function: Callable) -> Callable:
         before = config.CACHE_DIR
