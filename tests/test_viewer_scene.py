@@ -174,4 +174,16 @@ def test_normals_of_a_surface_of_revolution_point_away_from_its_axis():
     normal = shapes.normals(vertices[None], triangles)[0]
     middle = slice(24, 72)  # the rings that are not at an end
     outwards = vertices[middle] * [0.0, 0.5, 0.5]
-    assert np.abs(np.einsum("ij,ij->i", normal[middle], outwards)) == pytest.approx(1.0, abs=0.02)
+    assert np.einsum("ij,ij->i", normal[middle], outwards) == pytest.approx(1.0, abs=0.02)
+
+
+def test_skins_of_blades_and_tower_face_outwards_so_that_light_falls_on_them():
+    skin = shapes.blade_skin(read_turbine_file("nrel5mw"), shape())
+    pose = shape().pose(state(), skin.radius)
+    for vertices, triangles, sides in (
+        (skin.vertices(pose)[:, 0], skin.triangles(), skin.outline.shape[1]),
+        (shapes.tower_vertices(pose), shapes.tower_triangles(9), 10),
+    ):
+        middle = vertices[0].reshape(-1, sides, 3).mean(axis=1).repeat(sides, axis=0)
+        outwards = np.einsum("ij,ij->i", vertices[0] - middle, shapes.normals(vertices, triangles)[0])
+        assert (outwards > 0).all()

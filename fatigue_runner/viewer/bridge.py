@@ -148,12 +148,17 @@ class Bridge:
         )
         for place, (name, (points, colour)) in enumerate(drawing.series.items()):
             # good integrators lie on each other: smaller dots on larger ones show that all are there
-            size = 2.4 - 1.6 * place / max(len(drawing.series) - 1, 1)
+            size = 3.2 - 1.8 * place / max(len(drawing.series) - 1, 1)
             dots = rr.Points2D(
-                points, colors=[colour], radii=size, labels=[name] * len(points), show_labels=False
+                points,
+                colors=[colour],
+                radii=size,
+                labels=[name] * len(points),
+                show_labels=False,
+                draw_order=40.0 + place,
             )
             self.recording.log(f"campaign/chart/series/{place}", dots, static=True)
-            spot = [20.0 + 40.0 * (place % 4), CHART[1] + 22.0 + 8.0 * (place // 4)]
+            spot = [20.0 + 60.0 * (place % 3), CHART[1] + 22.0 + 8.0 * (place // 3)]
             key = rr.Points2D([spot], colors=[colour], radii=0.01, labels=[name], show_labels=True)
             self.recording.log(f"campaign/chart/key/{place}", key, static=True)
 

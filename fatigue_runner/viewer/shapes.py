@@ -20,9 +20,9 @@ from fatigue_runner.viewer.scene import Geometry, Pose
 Array = NDArray[np.float64]
 Triangles = NDArray[np.uint32]
 
-# A section's outline from the leading edge over the upwind side: fraction of the chord, and of the thickness.
-_AIRFOIL = np.array([[0.0, 0.0], [0.25, 0.5], [0.7, 0.28], [1.0, 0.0], [0.7, -0.28], [0.25, -0.5]])
-_CIRCLE = np.array([[(1 - np.cos(t)) / 2, np.sin(t) / 2] for t in np.arange(6) * pi / 3])
+# A section's outline from the leading edge over the downwind side: fraction of the chord, and of the thickness.
+_AIRFOIL = np.array([[0.0, 0.0], [0.25, -0.5], [0.7, -0.28], [1.0, 0.0], [0.7, 0.28], [0.25, 0.5]])
+_CIRCLE = np.array([[(1 - np.cos(t)) / 2, -np.sin(t) / 2] for t in np.arange(6) * pi / 3])
 _STATIONS = 14  # along the drawn blade
 _TOWER_SIDES = 10
 
