@@ -36,9 +36,9 @@ for loop in (loops.runge_kutta, loops.multistep):
             ours = "fatigue_runner" in name and "7cpython" not in name
         elif ours and not line.strip().startswith("."):
             counts = functions.setdefault(name, [0, 0])
-            arithmetic = re.match(r"\\s*v?(f?n?m?(add|sub|mul|div|madd|msub|fmadd\\d*|fnmadd\\d*|fmsub\\d*|fnmsub\\d*))(pd|sd)\\s", line)
+            arithmetic = re.match(r"\\s*v?(add|sub|mul|div|max|f[n]?m(?:add|sub)\\d+)(pd|sd)\\s", line)
             if arithmetic:
-                counts[arithmetic.group(3) == "pd"] += 1
+                counts[arithmetic.group(2) == "pd"] += 1
 print(json.dumps({"bits": digest.hexdigest(), "functions": functions}))
 """
 

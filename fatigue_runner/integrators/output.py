@@ -59,13 +59,20 @@ def plan_output(
     exact = np.abs(place - nearest) < 1e-6
     number = np.where(exact, nearest, np.ceil(place)).astype(np.int64)
     position, velocity = np.zeros((len(time), 9)), np.zeros((len(time), 9))
+    three = order > 4 and steps > 1
+    if three and np.any((number == 1) & ~exact):
+        # the first step's outputs wait for the second step's end, to have three step ends; so its own end must wait, too, and is
+        # then the one before the newest: weight 1 on its value and on its slope
+        position[(number == 1) & exact, 3] = velocity[(number == 1) & exact, 4] = 1.0
+        waiting = number == 1
+        number[waiting] = 2
+    else:
+        waiting = np.zeros(len(time), bool)
     for i in np.flatnonzero(~exact):
-        three = order > 4 and steps > 1
-        if three and number[i] == 1:
-            number[i] = 2  # the first step's outputs wait for the second step's end, to have three step ends
         # theta is rounded so that equal places of different steps share their weights
         theta = round(float(place[i] - (number[i] - 1)), 9)
         nodes = (-1.0, 0.0, 1.0) if three else (0.0, 1.0)
         q, v = hermite_weights(theta, nodes)
         position[i, 9 - len(q) :], velocity[i, 9 - len(v) :] = q, v
+    exact &= ~waiting
     return OutputPlan(time, number, exact, position, velocity)

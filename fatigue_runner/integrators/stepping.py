@@ -144,12 +144,14 @@ def largest_error(k, rows, weights, count, h, largest):
 @njit(**FAST)
 def scaled_error(largest, x, errors, interval):
     """errors[interval] (LANES,) = largest component of `largest` / (1 + |x|), per lane; `largest` starts anew."""
+    for m in range(WIDTH):
+        largest[m] /= 1.0 + abs(x[m])
+    # halves against each other: a loop over the states inside would be unrolled and not vectorised
+    for half in (8, 4, 2, 1):
+        for m in range(half * LANES):
+            largest[m] = max(largest[m], largest[half * LANES + m])
     for j in range(LANES):
-        errors[interval, j] = 0.0
-    for i in range(16):
-        for j in range(LANES):
-            e = largest[i * LANES + j] / (1.0 + abs(x[i * LANES + j]))
-            errors[interval, j] = max(errors[interval, j], e)
+        errors[interval, j] = largest[j]
     for m in range(WIDTH):
         largest[m] = 0.0
 

@@ -1,0 +1,212 @@
+"""Cost of one evaluation of the equations of motion: packed over lanes, scalar, and as a share of the machine's peak.
+
+Times are CPU times of one pinned thread: the wall time on an idle machine, and unharmed by what else runs on a busy one.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.benchmark import machine
+
+CASES = (1, 8, 16, 64, 256)
+STEP_METHODS = ("heun", "rk3", "rk4", "tsit5", "dop853", "ab4", "abm4")
+LOOKUP_OPERATIONS = 6  # of one cubic: three multiplications and three additions
+
+
+def operations() -> int:
+    """Floating-point operations of one evaluation for one case, counted in the kernel's source; a division or root is one."""
+    from fatigue_runner.turbine.generated import kernel
+
+    counter = _Operations()
+    tree = ast.parse(inspect.getsource(inspect.getmodule(kernel.rhs.py_func)))  # type: ignore[arg-type]
+    function = next(n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == "rhs")
+    loops = [node for node in function.body if isinstance(node, ast.For)]
+    for loop in (loops[0], loops[-1]):
+        counter.visit(loop)
+    return counter.count + LOOKUP_OPERATIONS * kernel.EQUATION_TABLES
+
+
+class _Operations(ast.NodeVisitor):
+    """Counts arithmetic outside of indices."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def visit_Subscript(self, node: ast.Subscript) -> None:
+        pass
+
+    def visit_BinOp(self, node: ast.BinOp) -> None:
+        self.count += 1
+        self.generic_visit(node)
+
+    def visit_Call(self, node: ast.Call) -> None:
+        self.count += 1
+        self.generic_visit(node)
+
+
+def scalar_kernel() -> tuple[Callable[..., None], int]:
+    """The right-hand side of the same generated source, built for one lane; and the rows of scratch it needs."""
+    from fatigue_runner.turbine.generated import kernel
+
+    module = inspect.getmodule(kernel.rhs.py_func)
+    source = inspect.getsource(module).replace(f"LANES = {kernel.LANES}\n", "LANES = 1\n", 1)  # type: ignore[arg-type]
+    # without a file there is nothing to cache: it is compiled anew in every benchmark
+    source = source.replace("from fatigue_runner.compiled import FAST, njit", "from numba import njit")
+    from fatigue_runner.compiled import FAST
+
+    space: dict[str, Any] = {"FAST": FAST, "__name__": "scalar_kernel"}
+    exec(compile(source, "<scalar kernel>", "exec"), space)
+    return space["rhs"], space["RHS_ROWS"]
+
+
+def _loop(rhs: Callable[..., None]) -> Callable[..., None]:
+    import numba
+
+    @numba.njit(nogil=True)
+    def run(repeats, x, wind, out, tables, cells, constants, scratch, row, clamped):
+        for _ in range(repeats):
+            for group in range(x.shape[0]):
+                rhs(x[group], wind[group], out[group], 0, tables, cells, constants, scratch, row, clamped)
+
+    return run
+
+
+def _work(run: Callable[..., None], turbine: Any, cases: int, lanes: int, rows: int) -> Callable[[], float]:
+    """A piece of work that returns nanoseconds per evaluation and case."""
+    from fatigue_runner.integrators.block import aligned
+
+    data = turbine.kernel_data(0.0)
+    groups = -(-cases // lanes)
+    speeds = np.linspace(5.0, 10.0, 16)
+    points = [turbine.operating_point(v) for v in speeds]
+    x = np.empty((groups, 16, lanes))
+    wind = np.zeros((groups, 3, lanes))
+    for i in range(groups * lanes):
+        x[i // lanes, :, i % lanes] = points[i % 16]
+        wind[i // lanes, 0, i % lanes] = speeds[i % 16]
+    flat, p = aligned(x.reshape(groups, -1)), aligned(wind.reshape(groups, -1))
+    out = aligned(np.zeros_like(flat))
+    scratch, row, clamped = (
+        aligned(np.zeros(rows * lanes)),
+        aligned(np.zeros(32 * lanes)),
+        np.zeros(lanes, np.int64),
+    )
+    tables = aligned(data.tables)
+    repeats = max(1, 4000 // groups // max(1, lanes // 2))
+
+    def once() -> float:
+        begin = time.thread_time()
+        run(repeats, flat, p, out, tables, data.cells, data.constants, scratch, row, clamped)
+        return (time.thread_time() - begin) / repeats / cases * 1e9
+
+    return once
+
+
+def peak() -> Callable[[], float]:
+    """A piece of work that returns this machine's rate of fused multiply-adds in full vectors [flop/ns]."""
+    import numba
+    from llvmlite import ir
+    from numba.core import cgutils, types
+    from numba.extending import intrinsic
+
+    width, chains = machine.describe()["vector_bits"] // 64, 12
+
+    @intrinsic
+    def multiply_adds(typing_context, rounds, start):
+        def codegen(context, builder, signature, args):
+            vector = ir.VectorType(ir.DoubleType(), width)
+            splat = builder.insert_element(ir.Constant(vector, ir.Undefined), args[1], ir.IntType(32)(0))
+            zero = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
+            factor = builder.shuffle_vector(splat, splat, zero)
+            slots = [cgutils.alloca_once_value(builder, factor) for _ in range(chains)]
+            with cgutils.for_range(builder, args[0]):
+                for slot in slots:
+                    product = builder.fmul(builder.load(slot), factor, flags=("contract",))
+                    builder.store(builder.fadd(product, factor, flags=("contract",)), slot)
+            total = builder.load(slots[0])
+            for slot in slots[1:]:
+                total = builder.fadd(total, builder.load(slot))
+            return builder.extract_element(total, ir.IntType(32)(0))
+
+        return types.float64(types.int64, types.float64), codegen
+
+    @numba.njit(nogil=True)
+    def run(rounds, start):
+        return multiply_adds(rounds, start)
+
+    run(1, 0.5)
+
+    def once() -> float:
+        rounds = 200_000
+        begin = time.thread_time()
+        run(rounds, 0.5)
+        return rounds * chains * width * 2 / ((time.thread_time() - begin) * 1e9)
+
+    return once
+
+
+def _step_work(turbine: Any, method: str, step: float = 0.01, duration: float = 4.0) -> Callable[[], float]:
+    """A whole simulation of 16 turbulent cases logged at 50 Hz: nanoseconds per evaluation and case, everything included."""
+    from fatigue_runner.integrators import simulate_block
+    from fatigue_runner.wind import TurbulentWind
+
+    winds = [TurbulentWind(8.0, intensity=0.14, seed=seed, duration=duration) for seed in range(16)]
+    initial = np.repeat(turbine.operating_point(8.0)[None], 16, axis=0)
+
+    def once() -> float:
+        block = simulate_block(turbine, method, step, winds, initial, duration, 0.02)
+        return sum(t.wall_time for t in block) / sum(t.evaluations for t in block) * 1e9
+
+    return once
+
+
+def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
+    """All figures of `fatigue-runner benchmark kernel` as plain values; times in ns per evaluation and case."""
+    from fatigue_runner.turbine import load_turbine
+    from fatigue_runner.turbine.generated import kernel
+
+    turbine = load_turbine(turbine_name)
+    packed, (scalar, scalar_rows) = _loop(kernel.rhs), scalar_kernel()
+    scalar_loop = _loop(scalar)
+    work = {f"packed {n}": _work(packed, turbine, n, kernel.LANES, kernel.RHS_ROWS) for n in CASES}
+    work |= {f"scalar {n}": _work(scalar_loop, turbine, n, 1, scalar_rows) for n in CASES}
+    work |= {f"step {name}": _step_work(turbine, name) for name in STEP_METHODS}
+    work["peak"] = peak()
+    with machine.pinned():
+        found = machine.interleaved(work, repeats)
+    flops, best = operations(), found["packed 256"]["median"]
+    rate = found["peak"]["median"]
+    rows = [
+        {
+            "cases": n,
+            "packed": found[f"packed {n}"],
+            "scalar": found[f"scalar {n}"],
+            "ratio": found[f"scalar {n}"]["median"] / found[f"packed {n}"]["median"],
+        }
+        for n in CASES
+    ]
+    steps = [
+        {
+            "method": m,
+            "whole_step": found[f"step {m}"],
+            "over_kernel": found[f"step {m}"]["median"] / best - 1,
+        }
+        for m in STEP_METHODS
+    ]
+    return {
+        "machine": machine.describe(),
+        "lanes": kernel.LANES,
+        "turbine": turbine.name,
+        "operations_per_evaluation": flops,
+        "peak_flop_per_ns": rate,
+        "share_of_peak": flops / best / rate,
+        "cases": rows,
+        "whole_steps": steps,
+    }
