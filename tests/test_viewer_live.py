@@ -119,9 +119,9 @@ def test_log_is_followed_while_it_is_written_and_played_at_its_pace(tmp_path):
     assert len(player.viewed.log.accepted) == 200
     # began at 100: after 2.5 s at twice real time, 5 s and their 101 rows are due
     assert player.due(now=102.5) == 101
-    assert player.due(now=105.1) == 201 and not player.played
+    assert player.due(now=105.1) == 201 and player.has_more
     player.sent = 201
-    assert player.played
+    assert not player.has_more
 
 
 def cut(t, start, stop):

@@ -78,9 +78,9 @@ class Player:
         return int(np.searchsorted(time_, time_[0] + self.pace * (now - self._began), side="right"))
 
     @property
-    def played(self) -> bool:
-        """Whether every row of the whole log was sent."""
-        return self.ended and self.viewed is not None and self.sent >= len(self.viewed.log.time)
+    def has_more(self) -> bool:
+        """Whether rows are there that were not sent; once the run is over no more come, also to a log that was cut off."""
+        return self.viewed is not None and self.sent < len(self.viewed.log.time)
 
 
 def extended(log: Log, block: Log) -> Log:
@@ -122,11 +122,7 @@ class Bridge:
             self._drawn = now
         if self.player is not None:
             self._play(self.player, now)
-        return not over or not (self.player is None or self.player.played or self._given_up(self.player))
-
-    def _given_up(self, player: Player) -> bool:
-        """The run is over and the case has no log: it failed, was not wanted, or logs are off."""
-        return player.viewed is None and not player.path.exists()
+        return not over or (self.player is not None and self.player.has_more)
 
     def _draw(self) -> None:
         import rerun as rr
