@@ -89,6 +89,19 @@ def run(
         str | None,
         typer.Option("--dask", help="Address of a dask scheduler (tcp://host:8786) to run on instead."),
     ] = None,
+    live: Annotated[
+        bool, typer.Option("--live", help="Watch in the viewer while it runs (docs/viewer.md).")
+    ] = False,
+    pace: Annotated[
+        float | None,
+        typer.Option("--pace", min=0.0, help="Play one case at this multiple of real time; implies --live."),
+    ] = None,
+    live_case: Annotated[
+        str | None, typer.Option("--live-case", help="The case to show; default: the first.")
+    ] = None,
+    viewer_port: Annotated[
+        int | None, typer.Option("--viewer-port", help="Port of a viewer that is already open here.")
+    ] = None,
 ) -> None:
     """Run a campaign, or the rest of one, and say which integrator is good enough.
 
@@ -100,13 +113,22 @@ def run(
         fatigue-runner run campaigns/quickstart.yaml
 
         fatigue-runner run my.yaml --out runs/try --workers 8
+
+        fatigue-runner run my.yaml --live --pace 1
     """
     from fatigue_runner.campaign import CampaignInterrupted, run_campaign
     from fatigue_runner.cli_tables import print_results
 
     console = _console()
+    watch = None
+    if live or pace is not None:
+        from fatigue_runner.viewer.live import watcher
+
+        watch = watcher(pace=pace, case=live_case, port=viewer_port, say=console.print)
     try:
-        results = run_campaign(campaign, out, workers=workers, fresh=fresh, dask=dask, console=console)
+        results = run_campaign(
+            campaign, out, workers=workers, fresh=fresh, dask=dask, console=console, watch=watch
+        )
     except KeyboardInterrupt:
         raise CampaignInterrupted("interrupted; the same command goes on") from None
     print_results(results, console)
@@ -140,6 +162,10 @@ def turbine(
         typer.Option("--wind", "-w", help="Wind speed [m/s]; may be repeated. Default 6, 8, 10."),
     ] = None,
     pitch: Annotated[float, typer.Option("--pitch", help="Blade pitch [deg], positive to feather.")] = 0.0,
+    write_tables: Annotated[
+        bool,
+        typer.Option("--write-tables", help="First make the aerodynamic tables that the turbine file names (8 s)."),
+    ] = False,
 ) -> None:
     """Show a turbine: masses, power coefficient, operating points, natural frequencies, stability limits.
 
@@ -148,7 +174,13 @@ def turbine(
         fatigue-runner turbine
 
         fatigue-runner turbine t2b1i1cg --wind 8 --wind 11
+
+        fatigue-runner turbine my-turbine.yaml --write-tables
     """
+    if write_tables:
+        from fatigue_runner.turbine.table_builder import make_tables
+
+        _console().print(f"wrote {make_tables(name)}")
     from fatigue_runner.cli_tables import print_turbine
 
     print_turbine(name, wind or [6.0, 8.0, 10.0], pitch, _console())

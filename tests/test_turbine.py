@@ -7,8 +7,8 @@ import pytest
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import simulate_block
-from fatigue_runner.turbine import load_turbine
-from fatigue_runner.turbine.parameters import at_pitch, read_turbine_file
+from fatigue_runner.turbine import load_turbine, table_builder
+from fatigue_runner.turbine.parameters import DATA, at_pitch, read_turbine_file
 from fatigue_runner.wind import ConstantWind
 
 # OpenFAST 5.0, the same degrees of freedom, quasi-steady BEM, k = 0.0255764 N.m/rpm^2, pitch 0, 8 m/s: rotor speed [rpm], generator
@@ -97,7 +97,8 @@ def test_the_operating_point_is_where_the_turbine_stays(name, wind):
     x = turbine.operating_point(wind)
     run = simulate_block(turbine, "dop853", 0.05, [ConstantWind(wind)], x[None], 60.0, 0.5)[0]
     assert run.state[-40:, 14].mean() == pytest.approx(x[14], rel=0.01)
-    assert run.state[-40:, 0].mean() == pytest.approx(x[0], rel=0.02)
+    # the loads swing once per revolution with tilt, so the mean differs from the point where the mean load is balanced by millimetres
+    assert run.state[-40:, 0].mean() == pytest.approx(x[0], abs=0.003)
 
 
 def test_pitch_to_feather_sheds_power():
@@ -183,7 +184,7 @@ def test_the_hash_knows_parameters_tables_and_interpolation():
         ({"hub": {}}, "mass"),
         ({"drivetrain": {}}, "missing"),
         ({"aerodynamics": {"tables": "nowhere.npz"}}, "nowhere.npz"),
-        ({"aerodynamics": {"tables": "nrel5mw_aero.npz", "interpolation": "cubc"}}, "did you mean 'cubic'"),
+        ({"aerodynamics": {"tables": DATA / "nrel5mw_aero.npz", "interpolation": "cubc"}}, "did you mean 'cubic'"),
         ({"generator": {"law": "optimum", "optimal_gain": 2.0}}, "did you mean 'optimal'"),
     ],
 )
@@ -191,6 +192,30 @@ def test_an_impossible_turbine_is_refused_with_the_place(change, message):
     data = read_turbine_file("nrel5mw") | change
     with pytest.raises(InputError, match=message):
         load_turbine(data)
+
+
+def test_tables_of_another_blade_are_refused_and_can_be_made_anew(tmp_path, monkeypatch):
+    child = tmp_path / "coned.yaml"
+    child.write_text("name: coned\nbase: nrel5mw\ngeometry: {precone_deg: -4.0}\n")
+    with pytest.raises(InputError, match="made for another blade.*--write-tables"):
+        load_turbine(str(child))
+    with pytest.raises(InputError, match="shipped"):
+        table_builder.make_tables(str(child))
+    child.write_text(child.read_text() + "aerodynamics: {tables: coned.npz}\n")
+    # a coarse grid: the whole one takes 8 s
+    monkeypatch.setattr(table_builder, "TIP_SPEED_RATIO", np.linspace(5.0, 10.0, 6))
+    monkeypatch.setattr(table_builder, "PITCH_DEG", np.array([-1.0, 0.0, 1.0, 2.0]))
+    monkeypatch.setattr(
+        table_builder.build_tables, "__defaults__", (table_builder.TIP_SPEED_RATIO, table_builder.PITCH_DEG)
+    )
+    assert table_builder.make_tables(str(child)) == tmp_path / "coned.npz"
+    assert load_turbine(str(child)).hash != load_turbine("nrel5mw").hash
+
+
+def test_a_turbine_in_another_folder_inherits_the_tables_of_its_base(tmp_path):
+    child = tmp_path / "heavier.yaml"
+    child.write_text("name: heavier\nbase: nrel5mw\nhub: {mass: 60000.0}\n")
+    assert load_turbine(str(child)).parameters["h_m"] == 60000.0
 
 
 def test_an_unknown_turbine_is_refused_with_the_nearest_name():

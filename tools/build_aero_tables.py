@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from fatigue_runner.turbine.parameters import DATA, read_turbine_file
+from fatigue_runner.turbine.parameters import read_turbine_file
 from fatigue_runner.turbine.table_builder import (
     PITCH_DEG,
     TIP_SPEED_RATIO,
@@ -31,7 +31,7 @@ SAMPLES = 200
 def problems(name: str) -> list[str]:
     """What is wrong with the committed tables of one shipped turbine; empty where they are current."""
     parameters = read_turbine_file(name)
-    path = DATA / parameters["aerodynamics"]["tables"]
+    path = Path(parameters["aerodynamics"]["tables"])
     if not path.is_file():
         return [f"{path.name} is missing"]
     blade, inputs = turbine_blade(parameters)
@@ -65,7 +65,7 @@ def main() -> int:
     for name in TURBINES:
         parameters = read_turbine_file(name)
         blade, inputs = turbine_blade(parameters)
-        path = DATA / parameters["aerodynamics"]["tables"]
+        path = Path(parameters["aerodynamics"]["tables"])
         write_tables(path, build_tables(blade), inputs)
         print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
     return 0

@@ -54,7 +54,10 @@ def read_turbine_file(name: str) -> dict[str, Any]:
         raise InputError(f"{path} is not a YAML file: {' '.join(str(error).split())}") from None
     if not isinstance(data, dict):
         raise InputError(f"{path}: expected a mapping with `name`, `blade`, `tower`, ...")
-    data.setdefault("folder", str(path.parent))
+    # where a file names other files, they lie beside it, also when another turbine in another folder builds on it
+    for key in ("tables", "airfoils"):
+        if isinstance(data.get("aerodynamics"), dict) and key in data["aerodynamics"]:
+            data["aerodynamics"][key] = str(path.parent / str(data["aerodynamics"][key]))
     base = data.pop("base", None)
     return _merge(read_turbine_file(base), data) if base else data
 

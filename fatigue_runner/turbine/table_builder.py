@@ -11,12 +11,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fatigue_runner.errors import InputError
 from fatigue_runner.turbine.aerodynamics import LOAD_NAMES, BladeAerodynamics, blade_aerodynamics, rotor_loads
 from fatigue_runner.turbine.beam import blade_modes
 
@@ -53,12 +55,28 @@ def build_tables(
 
 def turbine_blade(parameters: Mapping[str, Any]) -> tuple[BladeAerodynamics, str]:
     """The blade of a mapping from parameters.read_turbine_file, and the hash of what its tables depend on."""
-    from ruamel.yaml import YAML
-
-    path = Path(parameters["folder"]) / parameters["aerodynamics"]["airfoils"]
-    airfoils = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    airfoils = _airfoils(parameters)
     blade = blade_aerodynamics(parameters, airfoils, blade_modes(parameters))
     return blade, inputs_hash(parameters, airfoils)
+
+
+def turbine_inputs(parameters: Mapping[str, Any]) -> str:
+    """The hash of what the tables of a turbine file's mapping depend on."""
+    return inputs_hash(parameters, _airfoils(parameters))
+
+
+@lru_cache(maxsize=8)
+def _read_airfoils(path: str) -> Mapping[str, Any]:
+    from ruamel.yaml import YAML
+
+    return YAML(typ="safe").load(Path(path).read_text(encoding="utf-8"))
+
+
+def _airfoils(parameters: Mapping[str, Any]) -> Mapping[str, Any]:
+    path = str(parameters["aerodynamics"]["airfoils"])
+    if not Path(path).is_file():
+        raise InputError(f"airfoil file {path} does not exist; aerodynamics: airfoils names it")
+    return _read_airfoils(path)
 
 
 def inputs_hash(parameters: Mapping[str, Any], airfoils: Mapping[str, Any]) -> str:
@@ -70,7 +88,7 @@ def inputs_hash(parameters: Mapping[str, Any], airfoils: Mapping[str, Any]) -> s
         "grid": [TIP_SPEED_RATIO.tolist(), PITCH_DEG.tolist()],
         "geometry": {k: geometry[k] for k in ("blades", "hub_radius", "tip_radius", "precone_deg")},
         "shapes": [blade["flap_mode"], blade["edge_mode"], blade["stations"]],
-        "aerodynamics": {k: v for k, v in aerodynamics.items() if k not in ("tables", "interpolation")},
+        "aerodynamics": {k: v for k, v in aerodynamics.items() if k not in ("tables", "airfoils", "interpolation")},
         "airfoils": airfoils["airfoils"],
     }
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
@@ -86,3 +104,21 @@ def write_tables(path: Path, coefficients: Array, inputs: str) -> None:
         coefficients=coefficients,
         inputs=np.array(inputs),
     )
+
+
+def make_tables(name: str) -> Path:
+    """Make the tables of a turbine file where it says that they are; returns the path.
+
+    Raises InputError for a shipped turbine, whose tables belong to the program.
+    """
+    from fatigue_runner.turbine.parameters import DATA, read_turbine_file
+
+    parameters = read_turbine_file(name)
+    path = Path(str(parameters["aerodynamics"]["tables"]))
+    if path.parent == DATA:
+        raise InputError(
+            f"turbine {name}: its tables are the shipped {path.name}; give your own file as `aerodynamics: tables:`"
+        )
+    blade, inputs = turbine_blade(parameters)
+    write_tables(path, build_tables(blade), inputs)
+    return path

@@ -13,7 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters, read_turbine_file
+from fatigue_runner.turbine.parameters import (
+    DATA,
+    at_pitch,
+    checked,
+    equation_parameters,
+    read_turbine_file,
+)
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
 
 Array = NDArray[np.float64]
@@ -151,6 +157,23 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     aero = data.get("aerodynamics", {})
     if "tables" not in aero:
         raise InputError(f"turbine {name}: aerodynamics needs `tables`, the npz of coefficients")
-    path = Path(str(data.get("folder", "."))) / str(aero["tables"])
+    path = Path(str(aero["tables"]))
     tables = read_tables(path, str(aero.get("interpolation", "cubic")))
+    # a shipped turbine's tables are checked when the project is built; a user's may have been made before the blade changed
+    if isinstance(source, Mapping) or Path(str(source)).suffix:
+        _check_inputs(path, data)
     return Turbine(name, parameters, tables, str(data.get("description", "")))
+
+
+def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:
+    """Refuse tables that were made for another blade."""
+    from fatigue_runner.turbine.table_builder import turbine_inputs
+
+    with np.load(path, allow_pickle=False) as stored:
+        made_for = str(stored["inputs"]) if "inputs" in stored else ""
+    # tables from another program carry no such hash: whoever gives them answers for them
+    if made_for and "airfoils" in data["aerodynamics"] and made_for != turbine_inputs(data):
+        raise InputError(
+            f"aerodynamic tables {path} were made for another blade, cone or airfoil than turbine {data.get('name', '?')} has now; "
+            "make them anew with `fatigue-runner turbine FILE --write-tables`"
+        )
