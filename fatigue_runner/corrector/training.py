@@ -1,0 +1,301 @@
+"""Training of a network on defects: AdamW, mini-batches, a falling learning rate; the one module that imports PyTorch."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import itertools
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from fatigue_runner.corrector.training_data import Pairs, Scaling, fold
+from fatigue_runner.errors import InputError, did_you_mean
+
+Array = NDArray[np.float64]
+Progress = Callable[[dict[str, float]], None]
+
+SCHEDULERS = ("plateau", "cosine", "exponential")
+ACTIVATIONS = ("relu", "isru")
+SAVE_EVERY = 20.0  # s between checkpoints: a kill costs no more than this
+
+
+@dataclass(frozen=True)
+class MlpSettings:
+    """How a network is made and trained; the defaults are the paper's sizes.
+
+    Training ends after `epochs`, or when the plateau scheduler has brought the learning rate to `smallest_rate`.
+    `patience` counts epochs without a better validation loss before the rate is multiplied with `factor`; the other
+    schedulers fall from `learning_rate` to `smallest_rate` over all epochs. `threads`: of PyTorch on a processor (0: its own
+    choice).
+    """
+
+    hidden: tuple[int, ...] = (111, 111, 111)
+    activation: str = "relu"
+    batch: int = 256
+    learning_rate: float = 2e-3
+    smallest_rate: float = 1e-6
+    scheduler: str = "plateau"
+    factor: float = 0.5
+    patience: int = 100
+    weight_decay: float = 1e-4
+    epochs: int = 20000
+    seed: int = 0
+    precision: str = "float32"
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name, value, known in (
+            ("scheduler", self.scheduler, SCHEDULERS),
+            ("activation", self.activation, ACTIVATIONS),
+            ("precision", self.precision, ("float32", "float64")),
+        ):
+            if value not in known:
+                raise InputError(f"training: unknown {name} {value!r}{did_you_mean(value, known)}")
+        for name in ("batch", "learning_rate", "smallest_rate", "patience", "epochs"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"training: {name} must be positive, got {getattr(self, name)}")
+        if not (0 < self.factor < 1 and self.smallest_rate <= self.learning_rate and self.weight_decay >= 0):
+            raise InputError(
+                "training: factor must lie between 0 and 1, smallest_rate at most at learning_rate, weight_decay at 0 or above"
+            )
+        if not all(0 < width <= 500 for width in self.hidden):
+            raise InputError(f"training: hidden layers have 1 to 500 units, got {list(self.hidden)}")
+
+
+@dataclass
+class History:
+    """What happened, one entry per epoch: mean squared errors of the scaled outputs, learning rate; best epoch (from 1)."""
+
+    train: list[float] = field(default_factory=list)
+    validation: list[float] = field(default_factory=list)
+    rate: list[float] = field(default_factory=list)
+    seconds: float = 0.0
+    best_epoch: int = 0
+    best: float = float("inf")
+    stopped: bool = False
+    device: str = "cpu"
+
+
+class _ISRU(torch.nn.Module):
+    """x / sqrt(1 + x^2), as the lane kernel has it."""
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        return x * torch.rsqrt(1 + x * x)
+
+
+def network(inputs: int, outputs: int, settings: MlpSettings) -> torch.nn.Sequential:
+    """Affine layers with the activation between them."""
+    sizes = (inputs, *settings.hidden, outputs)
+    parts: list[torch.nn.Module] = []
+    for a, b in itertools.pairwise(sizes):
+        parts += [torch.nn.Linear(a, b), torch.nn.ReLU() if settings.activation == "relu" else _ISRU()]
+    return torch.nn.Sequential(*parts[:-1])
+
+
+def layers_of(state: dict[str, torch.Tensor]) -> tuple[Array, ...]:
+    """(outputs, 1 + inputs) matrices with the bias first, float64, of a `network`'s parameters."""
+    numbers = sorted({int(name.split(".")[0]) for name in state})
+    out = []
+    for i in numbers:
+        weight, bias = (state[f"{i}.{part}"].cpu().double().numpy() for part in ("weight", "bias"))
+        out.append(np.concatenate([bias[:, None], weight], axis=1))
+    return tuple(out)
+
+
+def train_mlp(
+    train: Pairs,
+    validation: Pairs,
+    settings: MlpSettings,
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
+) -> tuple[tuple[Array, ...], History]:
+    """Fit a network to `train`, judged by `validation`; min-max scaling of `train` is folded into the layers that are returned.
+
+    Returns layers (outputs, 1 + inputs) on plain values, those with the lowest validation loss, and the history. Ctrl-C
+    ends the training and keeps the best so far. `checkpoint`: a file to go on from, written every 20 s and at the end;
+    going on gives the same bits as never having stopped. `progress` gets epoch, epochs, train, validation, best, rate after
+    every epoch. On a CUDA device where there is one. Raises InputError for a checkpoint of other samples or settings.
+    """
+    with _reproducible(settings):
+        run = _Run(train, validation, settings)
+        if checkpoint is not None and checkpoint.exists():
+            run.restore(checkpoint)
+        _loop(run, settings, progress, checkpoint)
+    if run.best_state is None:
+        raise InputError("training ended before its first epoch; nothing was learned")
+    return fold(layers_of(run.best_state), run.scaling_in, run.scaling_out), run.history
+
+
+def _loop(run: _Run, settings: MlpSettings, progress: Progress | None, checkpoint: Path | None) -> None:
+    saved = time.monotonic()
+    whole = run.snapshot()
+    try:
+        while len(run.history.train) < settings.epochs and not run.exhausted():
+            run.epoch()
+            whole = run.snapshot()
+            if progress is not None:
+                progress(run.report())
+            if checkpoint is not None and time.monotonic() - saved > SAVE_EVERY:
+                _write(whole, checkpoint)
+                saved = time.monotonic()
+    except KeyboardInterrupt:
+        run.history.stopped = True
+    if checkpoint is not None:
+        # of the last whole epoch: half an epoch could not be gone on from with the same bits
+        _write(whole, checkpoint)
+
+
+class _Run:
+    """A training under way: all that a checkpoint holds, and the scaled samples."""
+
+    def __init__(self, train: Pairs, validation: Pairs, settings: MlpSettings) -> None:
+        self.settings = settings
+        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        kind = torch.float32 if settings.precision == "float32" else torch.float64
+        self.scaling_in, self.scaling_out = Scaling.fitted(train.inputs), Scaling.fitted(train.targets)
+        self.samples, self.judged = (
+            tuple(
+                torch.as_tensor(s.scale(v), dtype=kind, device=self.device)
+                for s, v in ((self.scaling_in, p.inputs), (self.scaling_out, p.targets))
+            )
+            for p in (train, validation)
+        )
+        self.model = network(train.inputs.shape[1], train.targets.shape[1], settings).to(self.device, kind)
+        self.optimizer = torch.optim.AdamW(
+            self.model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay, fused=True
+        )
+        self.scheduler = _scheduler(self.optimizer, settings)
+        self.order = torch.Generator().manual_seed(settings.seed)
+        self.history = History(device=str(self.device))
+        self.best_state: dict[str, torch.Tensor] | None = None
+        self.fingerprint = _fingerprint(train, validation, settings)
+
+    @property
+    def rate(self) -> float:
+        return float(self.optimizer.param_groups[0]["lr"])
+
+    def exhausted(self) -> bool:
+        """The plateau scheduler has nothing left to lower."""
+        return self.settings.scheduler == "plateau" and self.rate <= self.settings.smallest_rate
+
+    def epoch(self) -> None:
+        """One pass over the samples in a new order, the validation loss, and a step of the scheduler."""
+        begin, rate = time.monotonic(), self.rate
+        inputs, targets = self.samples
+        order = torch.randperm(len(inputs), generator=self.order).to(self.device)
+        total = torch.zeros((), device=self.device, dtype=torch.float64)
+        batches = zip(
+            inputs[order].split(self.settings.batch), targets[order].split(self.settings.batch), strict=True
+        )
+        for x, y in batches:
+            self.optimizer.zero_grad()
+            loss = torch.nn.functional.mse_loss(self.model(x), y)
+            loss.backward()
+            self.optimizer.step()
+            total += loss.detach() * len(x)
+        with torch.no_grad():
+            judged = float(torch.nn.functional.mse_loss(self.model(self.judged[0]), self.judged[1]))
+        history = self.history
+        history.train.append(float(total) / len(inputs))
+        history.validation.append(judged)
+        history.rate.append(rate)
+        if judged < history.best:
+            history.best, history.best_epoch = judged, len(history.train)
+            self.best_state = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
+        if self.settings.scheduler == "plateau":
+            self.scheduler.step(judged)
+        else:
+            self.scheduler.step()
+        history.seconds += time.monotonic() - begin
+
+    def report(self) -> dict[str, float]:
+        h = self.history
+        return {
+            "epoch": len(h.train), "epochs": self.settings.epochs, "train": h.train[-1], "validation": h.validation[-1],
+            "best": h.best, "rate": self.rate,
+        }  # fmt: skip
+
+    def snapshot(self) -> dict[str, Any]:
+        """All of the state after a whole epoch, independent of what happens next."""
+        return {
+            "fingerprint": self.fingerprint,
+            "model": copy.deepcopy(self.model.state_dict()),
+            "optimizer": copy.deepcopy(self.optimizer.state_dict()),
+            "scheduler": self.scheduler.state_dict(),
+            "order": self.order.get_state(),
+            "best_state": self.best_state,
+            "history": asdict(self.history),
+        }
+
+    def restore(self, path: Path) -> None:
+        """Go on from a checkpoint. Raises InputError where it is damaged or of another training."""
+        try:
+            found = torch.load(path, weights_only=True, map_location=self.device)
+            fingerprint = found["fingerprint"]
+        except Exception as error:
+            raise InputError(
+                f"{path} is no whole checkpoint ({type(error).__name__}); delete it to train from the start"
+            ) from None
+        if fingerprint != self.fingerprint:
+            raise InputError(
+                f"{path} is the checkpoint of other samples or settings; delete it to train from the start"
+            )
+        self.model.load_state_dict(found["model"])
+        self.optimizer.load_state_dict(found["optimizer"])
+        self.scheduler.load_state_dict(found["scheduler"])
+        self.order.set_state(found["order"].cpu())
+        self.best_state, self.history = found["best_state"], History(**found["history"])
+        self.history.stopped = False
+
+
+def _scheduler(optimizer: torch.optim.Optimizer, settings: MlpSettings) -> Any:
+    s = settings
+    if s.scheduler == "plateau":
+        return torch.optim.lr_scheduler.ReduceLROnPlateau(
+            optimizer, factor=s.factor, patience=s.patience, min_lr=s.smallest_rate, threshold=1e-3
+        )
+    if s.scheduler == "cosine":
+        return torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, s.epochs, eta_min=s.smallest_rate)
+    return torch.optim.lr_scheduler.ExponentialLR(
+        optimizer, (s.smallest_rate / s.learning_rate) ** (1 / s.epochs)
+    )
+
+
+def _fingerprint(train: Pairs, validation: Pairs, settings: MlpSettings) -> str:
+    """Hash of the samples and of every setting that a resumed training may not change."""
+    free = {"threads"} | ({"epochs"} if settings.scheduler == "plateau" else set())
+    digest = hashlib.sha256(json.dumps({k: v for k, v in asdict(settings).items() if k not in free}).encode())
+    for values in (train.inputs, train.targets, validation.inputs, validation.targets):
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()
+
+
+def _write(state: dict[str, Any], path: Path) -> None:
+    part = path.with_name(path.name + ".part")
+    torch.save(state, part)
+    part.replace(path)
+
+
+@contextmanager
+def _reproducible(settings: MlpSettings) -> Iterator[None]:
+    """The seed's random numbers, deterministic kernels and the stated threads inside; the caller's own outside."""
+    threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    with torch.random.fork_rng():
+        torch.manual_seed(settings.seed)
+        torch.use_deterministic_algorithms(True, warn_only=True)
+        if settings.threads:
+            torch.set_num_threads(settings.threads)
+        try:
+            yield
+        finally:
+            torch.set_num_threads(threads)
+            torch.use_deterministic_algorithms(strict)
