@@ -1,8 +1,9 @@
 """All integrators over a range of steps on the same cases: what each costs, and how far each is from the reference.
 
 Costs: evaluations of f, and measured time of whole steps with output, per simulated second and case, from repeats in which every
-integrator runs once per round on one pinned core; CPU time, which is the wall time of an idle machine. `delta_t`: the paper (arXiv:2504.05493) plots its errors over a time; its formula was not at
-hand, so it is taken as the mean wall time per simulated second and case [s/s]. Errors: see `accuracy` and `fatigue`.
+integrator runs once per round on one pinned core; CPU time, which is the wall time of an idle machine. `delta_t`: the paper
+(arXiv:2504.05493) plots its errors over a time; its formula was not at hand, so it is taken as the mean of that time [s/s].
+Errors: see `accuracy` and `fatigue`.
 """
 
 from __future__ import annotations

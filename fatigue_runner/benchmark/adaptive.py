@@ -1,0 +1,173 @@
+"""Adaptive DOP853 and Tsit5, case by case through SciPy: how many evaluations a step-size control needs for an accuracy.
+
+SciPy's interpreter time says nothing about a compiled adaptive code, so two costs are given: the measured time, and evaluations
+times the cost of f for one case alone, which no adaptive code can beat: cases with steps of their own cannot share vectors.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.benchmark.cases import Cases
+from fatigue_runner.benchmark.work_precision import Point, Reference, evaluate
+
+TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+METHODS = ("dop853-adaptive", "tsit5-adaptive")
+# Absolute tolerance of a state as a fraction of its range: the states differ by four orders of magnitude.
+ABSOLUTE = 1.0
+
+
+@dataclass
+class Solved:
+    """What `work_precision.evaluate` needs of a trajectory, and the evaluations it took."""
+
+    time: np.ndarray
+    state: np.ndarray
+    wind: np.ndarray
+    loads: dict[str, np.ndarray]
+    evaluations: int
+    seconds: float
+    diverged_at: float | None = None
+
+    @property
+    def duration(self) -> float:
+        return float(self.time[-1] - self.time[0])
+
+
+def right_hand_side(cases: Cases, wind: Any, duration: float) -> Callable[[float, np.ndarray], np.ndarray]:
+    """f(t, x) of one case, compiled; the lanes beside it are wasted."""
+    import numba
+
+    from fatigue_runner.integrators.stepping import wind_at
+    from fatigue_runner.turbine.generated import kernel
+    from fatigue_runner.turbine.lanes import to_groups, work_space
+
+    lanes, data = kernel.LANES, cases.turbine.kernel_data(cases.pitch)
+    cell_duration, cells = wind.cells(duration)
+    block = to_groups(np.ascontiguousarray(cells.reshape(-1, 1))).reshape(len(cells), 4, -1)
+    scratch, row, clamped = work_space()
+    state, p, slope = np.zeros(16 * lanes), np.zeros(3 * lanes), np.zeros(16 * lanes)
+    rhs = kernel.rhs
+    global _compiled
+    if _compiled is None:
+
+        @numba.njit(nogil=True)
+        def call(
+            t, x, cell_duration, block, state, p, slope, tables, count, constants, scratch, row, clamped
+        ):
+            for i in range(16):
+                for j in range(lanes):
+                    state[i * lanes + j] = x[i]
+            wind_at(t, cell_duration, block, p)
+            rhs(state, p, slope, 0, tables, count, constants, scratch, row, clamped)
+            out = np.empty(16)
+            for i in range(16):
+                out[i] = slope[i * lanes]
+            return out
+
+        _compiled = call
+    compiled: Any = _compiled
+
+    def f(t: float, x: np.ndarray) -> np.ndarray:
+        return compiled(
+            t,
+            x,
+            cell_duration,
+            block,
+            state,
+            p,
+            slope,
+            data.tables,
+            data.cells,
+            data.constants,
+            scratch,
+            row,
+            clamped,
+        )
+
+    return f
+
+
+_compiled: Any = None
+
+
+def solver(name: str) -> Any:
+    """SciPy's DOP853, or its Runge-Kutta class with this project's Tsit5 tableau."""
+    from scipy.integrate import DOP853, RK45
+
+    from fatigue_runner.integrators.tableaux import TSIT5
+
+    if name == "dop853-adaptive":
+        return DOP853
+    a, b, e, c = TSIT5.arrays()
+    n = TSIT5.evaluations_per_step
+
+    class Tsit5(RK45):
+        A, B, C, E, n_stages = a[:n, :n], b[:n], c[:n], -e, n
+
+    return Tsit5
+
+
+def solve(cases: Cases, number: int, reference: Any, name: str, tolerance: float) -> Solved:
+    """One case at one relative tolerance; outputs between steps by the quintic that the fixed-step methods use."""
+    from fatigue_runner.integrators.output import hermite_weights
+
+    wind, times = cases.winds[number], reference.time
+    duration = float(times[-1])
+    f = right_hand_side(cases, wind, duration)
+    scale = np.ptp(reference.state, axis=0)
+    begin = time.perf_counter()
+    stepper = solver(name)(
+        f, 0.0, cases.initial[number], duration, rtol=tolerance, atol=ABSOLUTE * tolerance * scale
+    )
+    states, filled = np.empty((len(times), 16)), 1
+    states[0] = stepper.y
+    old, old_slope = stepper.y.copy(), stepper.f.copy()
+    while stepper.status == "running":
+        stepper.step()
+        h = stepper.t - stepper.t_old
+        while filled < len(times) and times[filled] <= stepper.t + 1e-12:
+            q, v = hermite_weights((times[filled] - stepper.t_old) / h, (0.0, 1.0))
+            given = np.stack(
+                [
+                    old[:8],
+                    h * old[8:],
+                    h * h * old_slope[8:],
+                    stepper.y[:8],
+                    h * stepper.y[8:],
+                    h * h * stepper.f[8:],
+                ]
+            )
+            states[filled] = np.concatenate([q @ given, v @ given / h])
+            filled += 1
+        old, old_slope = stepper.y.copy(), stepper.f.copy()
+    seconds = time.perf_counter() - begin
+    signals = wind.at(times)
+    loads = cases.turbine.loads(states, signals, cases.pitch)
+    failed = stepper.t if stepper.status == "failed" else None
+    return Solved(times, states, signals, loads, stepper.nfev, seconds, failed)
+
+
+def measure(cases: Cases, reference: Reference, count: int = 4) -> list[Point]:
+    """Points of the adaptive methods on the first `count` cases; `step` is the mean step [s]."""
+    chosen = list(range(0, len(cases.winds), max(1, len(cases.winds) // count)))[:count]
+    part = Reference([reference.trajectories[i] for i in chosen], [reference.loads[i] for i in chosen])
+    points = []
+    for name in METHODS:
+        for tolerance in TOLERANCES:
+            block: Sequence[Any] = [
+                solve(cases, i, reference.trajectories[i], name, tolerance) for i in chosen
+            ]
+            rate = sum(s.evaluations for s in block) / len(block) / cases.duration
+            stages = 12 if name == "dop853-adaptive" else 6
+            seconds = sum(s.seconds for s in block) / len(block) / cases.duration
+            point = Point(
+                cases.name, f"{name} rtol {tolerance:g}", stages / rate, rate, {"interpreter": seconds}
+            )
+            points.append(evaluate(block, part, cases, point))
+    return points
