@@ -177,7 +177,7 @@ class _Run:
         self.order = torch.Generator().manual_seed(settings.seed)
         self.history = History(device=str(self.device))
         self.best_state: dict[str, torch.Tensor] | None = None
-        self.fingerprint = _fingerprint(train, validation, settings)
+        self.fingerprint = fingerprint(train, validation, settings)
 
     @property
     def rate(self) -> float:
@@ -270,7 +270,7 @@ def _scheduler(optimizer: torch.optim.Optimizer, settings: MlpSettings) -> Any:
     )
 
 
-def _fingerprint(train: Pairs, validation: Pairs, settings: MlpSettings) -> str:
+def fingerprint(train: Pairs, validation: Pairs, settings: MlpSettings) -> str:
     """Hash of the samples and of every setting that a resumed training may not change."""
     free = {"threads"} | ({"epochs"} if settings.scheduler == "plateau" else set())
     digest = hashlib.sha256(json.dumps({k: v for k, v in asdict(settings).items() if k not in free}).encode())
