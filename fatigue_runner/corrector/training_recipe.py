@@ -1,0 +1,233 @@
+"""From the recipe of a network to the corrector: the paper's experiment as data, from winds to the guarded artefact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from fatigue_runner.corrector import features
+from fatigue_runner.corrector.artefact import Corrector, Guard
+from fatigue_runner.corrector.samples import Samples
+from fatigue_runner.corrector.training_data import Pairs, along_trajectories, pairs
+from fatigue_runner.errors import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from fatigue_runner.corrector.training import MlpSettings, Progress
+    from fatigue_runner.corrector.tuning import Tuned
+    from fatigue_runner.turbine import Turbine
+
+Array = NDArray[np.float64]
+# state (16,) at t = 0 from turbine, name of the initial state and wind: `campaign.initial.initial_state`
+InitialState = Callable[[Any, str, Any], Array]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Speeds(_Part):
+    """Constant winds [m/s]. The test winds stand in neither list."""
+
+    train: list[float] = Field(min_length=1)
+    validation: list[float] = Field(min_length=1)
+
+
+class Perturbation(_Part):
+    """Copies of the samples moved off the trajectories; size in units of each state's deviation over the training set."""
+
+    copies: int = Field(default=0, ge=0, le=100)
+    size: float = Field(default=0.01, ge=0)
+
+
+class GuardRecipe(_Part):
+    """Acceptance test of the hybrid; atol is `atol_share` of each state's range over the training set."""
+
+    norm: Literal["max", "rms"] = "max"
+    kappa: float = Field(default=1.2, ge=1)
+    quantile: float = Field(default=1.0, gt=0, le=1)
+    atol_share: float = Field(default=1e-3, gt=0)
+    rtol: float = Field(default=0.0, ge=0)
+
+
+class MlpRecipe(_Part):
+    """What makes a network of family `mlp`; steps and durations in s. `training`: the fields of `training.MlpSettings`."""
+
+    name: str
+    family: Literal["mlp"] = "mlp"
+    description: str = ""
+    turbine: str = "t2b1i1cg"
+    method: str = "heun"
+    step: float = Field(gt=0)
+    speeds: Speeds
+    initial: Literal["operating-point", "paper", "paper-spinning"] = "paper-spinning"
+    duration: float = Field(default=20.0, gt=0)
+    perturbation: Perturbation = Perturbation()
+    training: dict[str, Any] = {}
+    guard: GuardRecipe = GuardRecipe()
+
+    @field_validator("training")
+    @classmethod
+    def _known(cls, value: dict[str, Any]) -> dict[str, Any]:
+        from fatigue_runner.corrector.training import MlpSettings
+
+        known = list(MlpSettings.__dataclass_fields__)
+        for key in value:
+            if key not in known:
+                raise ValueError(f"unknown setting {key!r}{did_you_mean(key, known)}")
+        return value
+
+    def settings(self) -> MlpSettings:
+        from fatigue_runner.corrector.training import MlpSettings
+
+        values = {k: tuple(v) if isinstance(v, list) else v for k, v in self.training.items()}
+        return MlpSettings(**values)
+
+
+def parse_recipe(data: Mapping[str, Any], place: str = "recipe") -> MlpRecipe:
+    """The recipe in a mapping. Raises InputError with the place and the key of the first mistake."""
+    try:
+        return MlpRecipe.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(k) for k in first["loc"])
+        extra = (
+            did_you_mean(str(first["loc"][-1]), _keys_beside(first["loc"]))
+            if first["type"] == "extra_forbidden"
+            else ""
+        )
+        raise InputError(f"{place}: {key}: {first['msg']}{extra}") from None
+
+
+def _keys_beside(location: tuple[int | str, ...]) -> list[str]:
+    parts: dict[str, type[_Part]] = {"speeds": Speeds, "perturbation": Perturbation, "guard": GuardRecipe}
+    return list(
+        parts.get(str(location[0]), MlpRecipe).model_fields if len(location) > 1 else MlpRecipe.model_fields
+    )
+
+
+def read_recipe(path: Path) -> MlpRecipe:
+    """The recipe in a YAML file. Raises InputError for one that cannot be read or has a mistake."""
+    from ruamel.yaml import YAML, YAMLError
+
+    try:
+        data = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        raise InputError(f"{path} cannot be read: {' '.join(str(error).split())}") from None
+    if not isinstance(data, dict):
+        raise InputError(f"{path} holds no recipe: it must be a mapping with name, method, step and speeds")
+    return parse_recipe(data, str(path))
+
+
+def sample_sets(recipe: MlpRecipe, turbine: Turbine, initial_state: InitialState) -> tuple[Samples, Samples]:
+    """Training and validation samples of a recipe; only the training ones are perturbed."""
+    from fatigue_runner.wind import ConstantWind
+
+    found = []
+    for speeds, more in ((recipe.speeds.train, recipe.perturbation.copies), (recipe.speeds.validation, 0)):
+        winds = [ConstantWind(speed) for speed in speeds]
+        start = np.array([initial_state(turbine, recipe.initial, wind) for wind in winds])
+        size = recipe.perturbation.size
+        found.append(
+            along_trajectories(turbine, recipe.method, recipe.step, winds, start, recipe.duration, more, size)
+        )
+    return found[0], found[1]
+
+
+def pair_sets(recipe: MlpRecipe, train: Samples, validation: Samples) -> tuple[Pairs, Pairs]:
+    return pairs(train, recipe.method, recipe.step), pairs(validation, recipe.method, recipe.step)
+
+
+def train_recipe(
+    recipe: MlpRecipe,
+    turbine: Turbine,
+    initial_state: InitialState,
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
+    text: str = "",
+) -> tuple[Corrector, Any]:
+    """The corrector that a recipe makes, guarded, and the training's history; `text`: the recipe's file, kept in the artefact."""
+    from fatigue_runner.corrector.training import train_mlp
+
+    train, validation = sample_sets(recipe, turbine, initial_state)
+    settings = recipe.settings()
+    layers, history = train_mlp(*pair_sets(recipe, train, validation), settings, progress, checkpoint)
+    made = {
+        "samples": len(train.plain), "epochs": len(history.train), "best_epoch": history.best_epoch,
+        "validation_loss": history.best, "training_loss": history.train[history.best_epoch - 1],
+        "seconds": round(history.seconds, 1), "device": history.device, "seed": settings.seed,
+        "initial": recipe.initial, "duration": recipe.duration,
+        "train_speeds": list(recipe.speeds.train), "validation_speeds": list(recipe.speeds.validation),
+    }  # fmt: skip
+    return guarded(recipe, turbine, layers, train, validation, made, text), history
+
+
+def tune_recipe(
+    recipe: MlpRecipe,
+    turbine: Turbine,
+    initial_state: InitialState,
+    trials: int,
+    epochs: int,
+    storage: Path,
+    progress: Callable[..., None] | None = None,
+) -> Tuned:
+    """`tuning.tune` with the samples of a recipe: `.settings` are to be written into its `training`."""
+    from fatigue_runner.corrector.tuning import tune
+
+    train, validation = pair_sets(recipe, *sample_sets(recipe, turbine, initial_state))
+    return tune(train, validation, recipe.settings(), trials, epochs, storage, progress)
+
+
+def guarded(
+    recipe: MlpRecipe,
+    turbine: Turbine,
+    layers: tuple[Array, ...],
+    train: Samples,
+    validation: Samples,
+    made: Mapping[str, Any],
+    text: str = "",
+) -> Corrector:
+    """Corrector of trained layers: acceptance threshold from the training set, relative residuals from the validation winds."""
+    from fatigue_runner.channels import STATE_NAMES
+    from fatigue_runner.corrector.fit import relative_residual
+
+    open_guard = Guard(
+        0.0, recipe.guard.norm, recipe.guard.kappa, recipe.guard.quantile, (1.0,) * 16, (0.0,) * 16
+    )
+    corrector = Corrector(
+        name=recipe.name, family=recipe.family, method=recipe.method, step=recipe.step,
+        turbine=turbine.name, turbine_hash=turbine.hash, kind=features.RAW, factors=(), linear=None, layers=layers,
+        activation=recipe.settings().activation, guard=open_guard,
+        wind_range=(min(recipe.speeds.train), max(recipe.speeds.train)), training=dict(made), recipe=text,
+    )  # fmt: skip
+    left = relative_residual(corrector.predict(validation), validation.defect)
+    judged = dict(zip(STATE_NAMES, left.tolist(), strict=True))
+    return replace(corrector, guard=_guard(recipe, turbine, corrector, train), validation=judged)
+
+
+def _guard(recipe: MlpRecipe, turbine: Turbine, corrector: Corrector, samples: Samples) -> Guard:
+    """Limit: kappa times the largest, or the quantile, of the training set's distances from the next order's method."""
+    from fatigue_runner.corrector.samples import single_steps
+    from fatigue_runner.integrators.correcting import SHARING
+
+    if recipe.method not in SHARING:
+        raise InputError(
+            f"{recipe.method} shares its stages with no method of the next order; networks are trained for heun"
+        )
+    state = samples.raw[:, 1:17]
+    pieces = np.zeros((len(state), 4, 3))
+    pieces[:, 0, 0] = samples.raw[:, 17]
+    fallback = single_steps(turbine, SHARING[recipe.method], recipe.step, state, pieces).plain
+    atol = recipe.guard.atol_share * np.ptp(state, axis=0)
+    rtol = np.full(16, recipe.guard.rtol)
+    scale = atol + np.maximum(np.abs(state), np.abs(fallback)) * rtol
+    away = np.abs(samples.plain + corrector.predict(samples) - fallback) / scale
+    size = away.max(axis=1) if recipe.guard.norm == "max" else np.sqrt((away**2).mean(axis=1))
+    g = recipe.guard
+    limit = g.kappa * float(np.quantile(size, g.quantile))
+    return Guard(limit, g.norm, g.kappa, g.quantile, tuple(atol.tolist()), tuple(rtol.tolist()))
