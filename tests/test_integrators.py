@@ -8,6 +8,7 @@ from smooth_turbine import smooth_turbine, smooth_wind
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import METHODS, method, simulate_block, stability_limit
+from fatigue_runner.integrators.exponential import ExponentialRungeKutta
 from fatigue_runner.integrators.multistep import LinearMultistep
 from fatigue_runner.integrators.output import hermite_weights
 from fatigue_runner.turbine import load_turbine
@@ -61,7 +62,8 @@ STEPS = {
     7: (72, 144),
     8: (48, 120),
 }
-LATE = {"tsit5": (768, 1200)}  # its first error term is so small that the second one rules at larger steps
+# tsit5's first error term is so small that the second one rules at larger steps; etdrk4's errors meet rounding early
+LATE = {"tsit5": (768, 1200), "etdrk4": (120, 240)}
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -73,7 +75,7 @@ def test_observed_order_on_the_turbine_in_changing_wind(smooth, start, reference
     assert observed == pytest.approx(method(name).order, abs=0.15)
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", [n for n in METHODS if not isinstance(method(n), ExponentialRungeKutta)])
 def test_the_compiled_loop_does_what_the_method_s_definition_says(smooth, start, name):
     h, steps, wind = 0.01, 6, smooth_wind(DURATION)
     found = method(name)
@@ -122,6 +124,7 @@ def test_evaluations_count_the_initial_slope_and_the_start_up(smooth, start, nam
         "tsit5": 6,
         "rk7": 11,
         "dop853": 12,
+        "etdrk4": 4,
     }
     expected = 1 + steps * cost.get(name, 0)
     expected = {"ab4": 1 + 3 * 4 + 7, "abm4": 1 + 3 * 4 + 7 * 2}.get(name, expected)
@@ -199,7 +202,7 @@ def cases(count: int):
     return winds
 
 
-@pytest.mark.parametrize("name", ["heun", "tsit5", "abm4"])
+@pytest.mark.parametrize("name", ["heun", "tsit5", "abm4", "etdrk4"])
 def test_a_case_s_bits_do_not_depend_on_its_neighbours_or_the_block_s_size(turbine, name):
     winds = cases(2 * LANES + 5)
     initial = np.stack([turbine.operating_point(w.mean_speed) for w in winds])
@@ -226,7 +229,7 @@ def test_constant_wind_gives_the_same_bits_next_to_changing_wind(turbine):
 # --- divergence ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["heun", "dp5", "abm4"])
+@pytest.mark.parametrize("name", ["heun", "dp5", "abm4", "etdrk4"])
 def test_a_diverging_lane_reports_its_time_and_leaves_the_others_bits_alone(turbine, name):
     winds = cases(4)
     initial = np.stack([turbine.operating_point(w.mean_speed) for w in winds])
@@ -282,7 +285,7 @@ def test_an_unknown_method_is_refused_with_the_nearest_one():
 # --- stability ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", [n for n in METHODS if not isinstance(method(n), ExponentialRungeKutta)])
 def test_the_predicted_stability_limit_separates_runs_that_stay_from_runs_that_grow(turbine, name):
     limit = stability_limit(turbine, name, 8.0)
     assert 0.0005 < limit < 1.0 or name == "euler"

@@ -182,7 +182,7 @@ def fitted_order(steps, errors) -> float:
     return -float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
-@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("name", TABLEAUX + ADAMS)
 def test_observed_order_on_a_nonlinear_and_non_autonomous_problem(name):
     steps = STEPS[method(name).order]
     duration = 4.0 if method(name).order == 7 else 2.0

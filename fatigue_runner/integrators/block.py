@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators.correcting import Correcting, prepare
+from fatigue_runner.integrators.exponential import ExponentialRungeKutta, matrices
 from fatigue_runner.integrators.methods import Method
 from fatigue_runner.integrators.methods import method as find_method
 from fatigue_runner.integrators.multistep import LinearMultistep
@@ -90,14 +91,14 @@ def _run(turbine, method, correcting, step, steps, winds, initial, plan, pitch) 
     from fatigue_runner.turbine.lanes import LANES, to_groups
     from fatigue_runner.wind import stack_cells
 
-    data = turbine.kernel_data(pitch)
+    data, prepared = turbine.kernel_data(pitch), _prepare(turbine, method, step, pitch)
     cell_duration, cells = stack_cells(winds, float(plan.time[-1]))
     groups = to_groups(np.ascontiguousarray(initial.T))
     # one group's cells: (n_cells, 4, 3 * LANES)
     blocks = to_groups(cells.reshape(-1, len(winds))).reshape(len(groups), len(cells), 4, -1)
     out: list[Trajectory] = []
     for number, (x, wind_cells) in enumerate(zip(groups, blocks, strict=True)):
-        group = _run_group(method, correcting, step, steps, x, (cell_duration, wind_cells), data, plan)
+        group = _run_group(prepared, correcting, step, steps, x, (cell_duration, wind_cells), data, plan)
         lanes = min(LANES, len(winds) - number * LANES)
         states = np.ascontiguousarray(group.rows.reshape(-1, 16, LANES).transpose(2, 0, 1)[:lanes])
         for lane in range(lanes):
@@ -121,19 +122,39 @@ def _run(turbine, method, correcting, step, steps, winds, initial, plan, pitch) 
     return out
 
 
-def _run_group(
-    method: Method, correcting: Correcting | None, step, steps, x, wind, data, plan: OutputPlan
-) -> _Group:
+def _prepare(turbine: Turbine, method: Method, step: float, pitch: float) -> tuple[Any, Any, int]:
+    """The compiled loop of a method, what it reads of the method, and the rows of slopes that it keeps."""
     from fatigue_runner.integrators import loops
     from fatigue_runner.integrators.kernel_data import multistep_data, runge_kutta_data, slope_rows
+
+    if isinstance(method, ExponentialRungeKutta):
+        # compiled only where it is used, as the corrected loop
+        from fatigue_runner.integrators.loops_exponential import exponential
+
+        return exponential, matrices(turbine, step, pitch), 3
+    if isinstance(method, LinearMultistep):
+        return loops.multistep, multistep_data(method), slope_rows(method)
+    assert isinstance(method, ButcherTableau)
+    # a corrector's fallback of the next order has one more stage
+    return loops.runge_kutta, runge_kutta_data(method), slope_rows(method) + 1
+
+
+def _run_group(
+    prepared: tuple[Any, Any, int],
+    correcting: Correcting | None,
+    step,
+    steps,
+    x,
+    wind,
+    data,
+    plan: OutputPlan,
+) -> _Group:
     from fatigue_runner.turbine.lanes import LANES, work_space
 
     if correcting is not None:
         # compiled only where it is used: a campaign without correctors starts faster
-        from fatigue_runner.integrators.corrected import corrected_steps
-    multistep = isinstance(method, LinearMultistep)
-    advance = loops.multistep if multistep else loops.runge_kutta
-    method_data = multistep_data(method) if multistep else runge_kutta_data(method)
+        from fatigue_runner.integrators.corrected import corrected_steps, working_arrays
+    advance, method_data, slopes = prepared
     cell_duration, cells = wind
     changing = bool(np.any(cells[:, 1:])) or len(cells) > 1
     scratch, row, clamped = (aligned(a) for a in work_space())
@@ -144,8 +165,7 @@ def _run_group(
     width = len(x)
     states = aligned(np.stack([start, start, start]))
     flat = [aligned(np.zeros(width)) for _ in range(3)]  # stage, slope, largest error
-    # a fallback of the next order has one more stage
-    k = aligned(np.zeros((slope_rows(method) + 1, width)))
+    k = aligned(np.zeros((slopes, width)))
     work = (states, k, aligned(np.zeros(3 * LANES)), *flat, aligned(start))
     group = _Group(
         np.empty((len(plan.time), width)),
@@ -166,7 +186,7 @@ def _run_group(
     else:
         corrected_steps(
             step, steps, correcting.method, correcting.network, correcting.safety, wind_data, model, plan_data,
-            (states, k, aligned(start)), group.rows, (group.accepted, group.discrepancy, group.errors),
+            working_arrays(start, len(k), aligned), group.rows, (group.accepted, group.discrepancy, group.errors),
             group.diverged_at, clamped,
         )  # fmt: skip
     group.wall = clock() - begin
@@ -196,7 +216,7 @@ def _trajectory(
         threshold=np.full(n - 1, correcting.limit if hybrid else np.nan),
         local_error=error,
         steps=steps,
-        evaluations=method.evaluations(steps) + (correcting.extra_evaluations * steps if correcting else 0),
+        evaluations=method.evaluations(steps) + (correcting.extra_evaluations(steps) if correcting else 0),
         clamped_lookups=int(group.clamped[lane]),
         wall_time=group.wall / lanes,
         diverged_at=diverged_at if diverged_at >= 0 else None,

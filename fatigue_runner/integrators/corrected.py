@@ -27,11 +27,13 @@ from fatigue_runner.turbine.generated.kernel import LANES
 
 _rhs = kernel.rhs
 NORM_MAX, NORM_RMS = 0, 1
+STARTING = 32  # substeps of a step before there is a history; with few, the start's error outweighs that of the run (measured)
+MOST_ROWS = 512  # of features with their factors, and of a hidden layer
 
 
 @njit(nogil=True, error_model="numpy")
-def guard(new, fallback, corrected, x, atol, rtol, limit, norm, accepted, discrepancy):
-    """new = corrected where its scaled distance from the fallback is within the limit, else the fallback; per lane.
+def guard(x, fallback, corrected, atol, rtol, limit, norm, accepted, discrepancy):
+    """x = corrected where its scaled distance from the fallback is within the limit, else the fallback; per lane.
 
     Compiled without fastmath: a comparison with NaN must be false, so that a NaN correction is refused.
     """
@@ -50,16 +52,16 @@ def guard(new, fallback, corrected, x, atol, rtol, limit, norm, accepted, discre
         discrepancy[j] = max(discrepancy[j], size)
         for i in range(16):
             m = i * LANES + j
-            new[m] = corrected[m] if ok else fallback[m]
+            x[m] = corrected[m] if ok else fallback[m]
 
 
 @njit(**FAST)
-def fall_back(n, h, now, current, states, k, fallback, wind, model, clamped, work, out):
+def fall_back(n, h, now, current, states, k, fallback, substeps, wind, model, clamped, work, out):
     """Result of the fallback from `current`, which is states[now]: more stages on top of the method's own, or smaller steps.
 
-    fallback = (stage table, result table, shared stages, substeps); work = (states (3, WIDTH), k, p, stage, slope).
+    fallback = (stage table, result table, shared stages, substeps); `substeps` of them; work = (states (3, WIDTH), k, p, stage, slope).
     """
-    (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), shared, substeps = fallback
+    (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), shared, _ = fallback
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     own, k2, p, stage, slope = work
@@ -101,6 +103,20 @@ def add(plain, defect, out):
 
 
 @njit(**FAST)
+def subtract(a, b, out):
+    """out = a - b"""
+    for m in range(WIDTH):
+        out[m] = a[m] - b[m]
+
+
+@njit(**FAST)
+def move(source, target):
+    """target = source"""
+    for m in range(WIDTH):
+        target[m] = source[m]
+
+
+@njit(**FAST)
 def keep_largest(defect, largest):
     """largest = max(largest, |defect|)"""
     for m in range(WIDTH):
@@ -114,7 +130,8 @@ def corrected_steps(
     """Advance one group by `steps` corrected steps of size h, as `loops.runge_kutta`, and
 
     method = (stage table, result table, rows of the stage slopes); network as `correction.correction`;
-    safety = (hybrid, fallback, atol (16,), rtol (16,), limit, norm); work = (states, k, restart).
+    safety = (hybrid, fallback, atol (16,), rtol (16,), limit, norm); work = `working_arrays`. A network that looks back at
+    earlier steps begins when it can: until then the fallback steps.
     status = (accepted, discrepancy, local error) (n - 1, LANES) are written: the worst of each output interval.
     """
     (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), stage_rows = method
@@ -122,22 +139,22 @@ def corrected_steps(
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     out_step, exact, position, velocity = plan
-    states, k, restart = work
+    (
+        (states, k, restart, current, stage, slope, plain, fixed, other, defect, largest),
+        (p, start, middle),
+        buffers,
+        inner,
+    ) = work
+    features, hidden = buffers
     accepted_out, discrepancy_out, error_out = status
-    p, start, middle = np.zeros(WIND), np.zeros(WIND), np.zeros(WIND)
-    stage, slope, plain, fixed = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
-    other, current, result = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
-    defect, largest = np.zeros(WIDTH), np.zeros(WIDTH)
-    features, hidden = np.zeros(512 * LANES), np.zeros((2, 512 * LANES))
-    inner = (np.zeros((3, WIDTH)), np.zeros_like(k), np.zeros(WIND), np.zeros(WIDTH), np.zeros(WIDTH))
     discrepancy, accepted = np.zeros(LANES), np.ones(LANES, np.bool_)
-    now, output, all_diverged = 0, 1, False
+    now, output, all_diverged, history = 0, 1, False, network[2]
 
     keep(restart, rows, 0)
-    current[:] = restart
     wind_at(0.0, cell_duration, wind_cells, p)
-    start[:] = p
-    middle[:] = p
+    for m in range(WIND):
+        start[m] = p[m]
+        middle[m] = p[m]
     _rhs(current, p, slope, 0, tables, cells, constants, scratch, row, clamped)
     keep(slope, k, 0)
     for n in range(steps):
@@ -154,22 +171,23 @@ def corrected_steps(
                 wind_at((n + 1) * h, cell_duration, wind_cells, p)
         stage_rows[0] = now
         correction(current, k, stage_rows, h, start, middle, p, network, features, hidden, defect)
-        add(plain, defect, fixed)
-        if hybrid:
-            fall_back(n, h, now, current, states, k, fallback, wind, model, clamped, inner, other)
-            guard(result, other, fixed, current, atol, rtol, limit, norm, accepted, discrepancy)
+        if hybrid or n < history:
+            substeps = STARTING if n < history else fallback[3]
+            fall_back(n, h, now, current, states, k, fallback, substeps, wind, model, clamped, inner, other)
+            if n < history:
+                move(other, current)
+            else:
+                add(plain, defect, fixed)
+                guard(current, other, fixed, atol, rtol, limit, norm, accepted, discrepancy)
             # the logged error estimate is the embedded one, not the learned one
-            for m in range(WIDTH):
-                defect[m] = other[m] - plain[m]
+            subtract(other, plain, defect)
         else:
-            add(plain, defect, result)
+            add(plain, defect, current)
         keep_largest(defect, largest)
-        if not all_fine(result):
-            all_diverged = mark_diverged(result, (n + 1) * h, diverged_at, restart)
-        keep(result, states, new)
-        for m in range(WIDTH):
-            current[m] = result[m]
-        _rhs(result, p, slope, 0, tables, cells, constants, scratch, row, clamped)
+        if not all_fine(current):
+            all_diverged = mark_diverged(current, (n + 1) * h, diverged_at, restart)
+        keep(current, states, new)
+        _rhs(current, p, slope, 0, tables, cells, constants, scratch, row, clamped)
         keep(slope, k, new)
         for m in range(WIND):
             start[m] = p[m]
@@ -177,14 +195,27 @@ def corrected_steps(
         while output < len(out_step) and out_step[output] <= n + 1:
             write_output(output, exact, position, velocity, h, states, k, now, rows)
             if output == first:
-                scaled_error(largest, result, error_out, output - 1)
+                scaled_error(largest, current, error_out, output - 1)
             for j in range(LANES):
                 error_out[output - 1, j] = error_out[first - 1, j]
                 accepted_out[output - 1, j] = accepted[j]
                 discrepancy_out[output - 1, j] = discrepancy[j]
             output += 1
         if output > first:
-            discrepancy[:] = 0.0
-            accepted[:] = True
+            for j in range(LANES):
+                discrepancy[j] = 0.0
+                accepted[j] = True
         if all_diverged:
             break
+
+
+def working_arrays(start, slopes, aligned):
+    """`work` of `corrected_steps` for the initial states `start` (WIDTH,) and `slopes` rows of k; aligned: copies onto cache lines."""
+    wide = [aligned(np.zeros(WIDTH)) for _ in range(7)]  # stage, slope, plain, fixed, other, defect, largest
+    states, k = aligned(np.stack([start] * 3)), aligned(np.zeros((slopes, WIDTH)))
+    winds = tuple(aligned(np.zeros(WIND)) for _ in range(3))
+    buffers = (aligned(np.zeros(MOST_ROWS * LANES)), aligned(np.zeros((2, MOST_ROWS * LANES))))
+    inner = (
+        np.zeros((3, WIDTH)), aligned(np.zeros_like(k)), np.zeros(WIND), aligned(np.zeros(WIDTH)), aligned(np.zeros(WIDTH)),
+    )  # fmt: skip
+    return (states, k, aligned(start), aligned(start), *wide), winds, buffers, inner

@@ -27,11 +27,19 @@ class Correcting:
     network: tuple[Any, ...]
     safety: tuple[Any, ...]
     limit: float
-    extra_evaluations: int  # of the fallback, per step
+    fallback_evaluations: int  # per step, beyond those it shares
 
     @property
     def hybrid(self) -> bool:
         return bool(self.safety[0])
+
+    def extra_evaluations(self, steps: int) -> int:
+        """Evaluations of the fallback in a run of `steps` steps: all of a hybrid, the first ones of a network that looks back."""
+        from fatigue_runner.integrators.corrected import STARTING
+
+        history, own = self.network[2], len(self.method[2])
+        start = min(steps, history)
+        return start * (STARTING * own - 1) + (self.fallback_evaluations * (steps - start) if self.hybrid else 0)
 
 
 def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: float, mode: str) -> Correcting:
@@ -73,6 +81,4 @@ def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: floa
         norm,
     )
     network = corrector.kernel_network(turbine.parameters["g_ratio"])
-    return Correcting(
-        (*data[:2], rows), network, safety, float(guard.limit), extra if mode == "hybrid" else 0
-    )
+    return Correcting((*data[:2], rows), network, safety, float(guard.limit), extra)

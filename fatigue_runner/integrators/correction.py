@@ -61,6 +61,17 @@ def features(x, k, stage_rows, h, ratio, start, middle, end, rows):
 
 
 @njit(**FAST)
+def remember(stages, history, rows):
+    """Move the last step's first-stage rows behind the stages, before `features` overwrites them; older ones one place on."""
+    first = (FIXED_ROWS + 8 * stages) * LANES
+    for m in range(first + 8 * LANES * history - 1, first + 8 * LANES - 1, -1):
+        rows[m] = rows[m - 8 * LANES]
+    if history > 0:
+        for m in range(8 * LANES):
+            rows[first + m] = rows[FIXED_ROWS * LANES + m]
+
+
+@njit(**FAST)
 def multiply(count, factors, rows):
     """Append rows 0..count times row `factors[i]`, for every i."""
     for f in range(len(factors)):
@@ -170,17 +181,18 @@ def activate(values, count, kind):
 def correction(x, k, stage_rows, h, start, middle, end, network, rows, hidden, out):
     """out (16, LANES) = linear part of the features plus a network of the features: the learned defect of the step.
 
-    network = (raw, ratio, factors, linear weights, net weights, sizes, activation): the linear part sees all rows, and all rows
-    times each row of `factors`; weights as `pack` orders them, one layer after the other; sizes = outputs of the layers behind a 0;
-    empty where there is no such part.
+    network = (raw, ratio, history, factors, linear weights, net weights, sizes, activation): the linear part sees all rows, and all
+    rows times each row of `factors`; `history` earlier steps' first stages follow the stages, `rows` must be kept between steps;
+    weights as `pack` orders them, one layer after the other; sizes = outputs of the layers behind a 0; empty where there is no such part.
     """
-    raw, ratio, factors, linear, net, sizes, activation = network
+    raw, ratio, history, factors, linear, net, sizes, activation = network
     if raw:
         raw_features(x, start, rows)
         count = RAW_ROWS
     else:
+        remember(len(stage_rows), history, rows)
         features(x, k, stage_rows, h, ratio, start, middle, end, rows)
-        count = FIXED_ROWS + 8 * len(stage_rows)
+        count = FIXED_ROWS + 8 * (len(stage_rows) + history)
     inputs = count
     if len(factors) > 0:
         multiply(count, factors, rows)

@@ -1,6 +1,7 @@
 """The registry of methods: name -> method.
 
-Adding a Runge-Kutta method is one entry in tableaux.py, an Adams method one in multistep.py, and one word here.
+Adding a Runge-Kutta method is one entry in tableaux.py, an Adams method one in multistep.py, and one word here; an exponential
+one stands in exponential.py.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.integrators import multistep as m
 from fatigue_runner.integrators import tableaux as t
+from fatigue_runner.integrators.exponential import ETDRK4
 
 
 class Method(Protocol):
@@ -32,8 +34,8 @@ class Method(Protocol):
         """Evaluations of f in a run of `steps` steps, the initial one and a start-up included."""
         ...
 
-    def growth(self, z: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Largest growth per step of a solution of x' = lambda x at z = h lambda."""
+    def growth(self, z: NDArray[np.complex128]) -> NDArray[np.float64] | None:
+        """Largest growth per step of a solution of x' = lambda x at z = h lambda; None where that says nothing."""
         ...
 
 
@@ -41,6 +43,7 @@ _BY_NAME: dict[str, Method] = {
     x.name: x
     for x in (
         t.EULER, t.HEUN, t.RK3, t.HEUN_RICHARDSON, t.BS32, t.RK4, t.DP5, t.TSIT5, t.RK7, m.AB4, m.ABM4,
+        ETDRK4,
     )
 }  # fmt: skip
 

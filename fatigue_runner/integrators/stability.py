@@ -13,6 +13,7 @@ from fatigue_runner.integrators.methods import method as find_method
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
+TRIED = 8  # runs
 LARGEST = 1.0  # s; no method of this program is used beyond
 
 
@@ -25,6 +26,8 @@ def stability_limit(turbine: Turbine, method: str, wind: float = 8.0, pitch: flo
     from fatigue_runner.turbine.steady import linearised
 
     growth = find_method(method).growth
+    if growth(np.zeros(1, complex)) is None:
+        return _tried_limit(turbine, method, wind, pitch)
     values = np.linalg.eigvals(linearised(turbine, wind, pitch))
     # the azimuth's free rotation has eigenvalue 0, which every method keeps
     values = values[np.abs(values) > 1e-3]
@@ -32,10 +35,36 @@ def stability_limit(turbine: Turbine, method: str, wind: float = 8.0, pitch: flo
         raise InputError(f"{turbine.name} itself is unstable at {wind:g} m/s, so that no step can be stable")
 
     def stable(h: float) -> bool:
-        return bool(np.all(growth(h * values) <= 1 + 1e-12))
+        grown = growth(h * values)
+        return grown is not None and bool(np.all(grown <= 1 + 1e-12))
 
     steps = np.geomspace(1e-5, LARGEST, 2000)
     unstable = next((i for i, h in enumerate(steps) if not stable(h)), None)
     if unstable is None:
         return LARGEST
     return float(steps[unstable - 1]) if unstable else 0.0
+
+
+def _tried_limit(turbine: Turbine, method: str, wind: float, pitch: float) -> float:
+    """Largest step of a fine scale below which small deviations from the steady rotation die out in simulated runs."""
+    from fatigue_runner.integrators.block import simulate_block
+    from fatigue_runner.wind import ConstantWind
+
+    base = turbine.operating_point(wind, pitch=pitch)
+    rng = np.random.Generator(np.random.PCG64(0))
+    start = np.repeat(base[None], TRIED, axis=0)
+    # deflections and their velocities; the rotation itself is neutral
+    start[1:, :6] += 1e-3 * rng.standard_normal((TRIED - 1, 6))
+    found = 0.0
+    for h in np.geomspace(0.02, LARGEST, 80):
+        runs = simulate_block(
+            turbine, method, float(h), [ConstantWind(wind)] * TRIED, start, 400 * float(h), pitch=pitch
+        )
+        if any(r.diverged_at is not None for r in runs):
+            break
+        off = np.array([r.state[:, 8:14] - runs[0].state[:, 8:14] for r in runs[1:]])
+        early, late = np.abs(off[:, 20:60]).max(), np.abs(off[:, -40:]).max()
+        if late > early:
+            break
+        found = float(h)
+    return found
