@@ -225,10 +225,11 @@ def test_the_committed_tables_are_those_of_the_committed_inputs(name):
     with np.load(path) as data:
         assert str(data["inputs"]) == inputs, "run `python tools/build_aero_tables.py`"
         stored = data["coefficients"]
-        np.testing.assert_array_equal(data["names"], TABLE_NAMES)
+        skewed = table_builder.has_skewed_wake(parameters)
+        np.testing.assert_array_equal(data["names"], table_builder.table_names(skewed))
     assert set(TABLE_NAMES) == set(TABLES)
     i, j = np.random.default_rng(1).integers(0, [[len(TIP_SPEED_RATIO)], [len(PITCH_DEG)]], (2, 40))
-    again = load_coefficients(blade, TIP_SPEED_RATIO[i], np.radians(PITCH_DEG[j]))
+    again = load_coefficients(blade, TIP_SPEED_RATIO[i], np.radians(PITCH_DEG[j]), skewed)
     np.testing.assert_allclose(again, stored[:, i, j], rtol=1e-7, atol=1e-9)
 
 
@@ -308,3 +309,15 @@ def with_shapes(blade, shapes, weights=None):
         return changed
     rows = {1: blade.weights[0], "r": blade.weights[1] / blade.rotor_radius, 0: 0 * blade.weights[0]}
     return dataclasses.replace(changed, weights=np.stack([*blade.weights[:2], *(rows[w] for w in weights)]))
+
+
+def test_the_leaning_wake_takes_load_from_the_lee_side_as_glauerts_formula_says():
+    # a (1 + 15 pi/64 (1 + 0.6 a) r/R skew): at small skew the thrust changes by its slope in the axial speed times that change
+    ratio, size = np.array([7.0]), 1e-4
+    lee, luff, none = (rotor_loads(FLAT, ratio, np.zeros(1), skew=k)[0, 0] for k in (size, -size, 0.0))
+    assert lee < none < luff
+    assert (lee - none) / (none - luff) == pytest.approx(1.0, rel=1e-2)
+    # induction is near 1/3 on the outer blade, so the axial speed 2/3 falls by 15 pi/64 * 1.2 * 0.75 / 3 per unit of skew there
+    change = 15 * np.pi / 64 * 1.2 / 3 * 0.75 / (2 / 3)
+    slope = (lee - luff) / (2 * size) / none
+    assert -2.0 * change < slope < -0.5 * change

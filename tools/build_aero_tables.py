@@ -19,6 +19,7 @@ from fatigue_runner.turbine.table_builder import (
     PITCH_DEG,
     TIP_SPEED_RATIO,
     build_tables,
+    has_skewed_wake,
     load_coefficients,
     turbine_blade,
     write_tables,
@@ -41,7 +42,9 @@ def problems(name: str) -> list[str]:
         return [f"{path.name} was made from other inputs"]
     random = np.random.default_rng(0)
     i, j = (random.integers(0, len(grid), SAMPLES) for grid in (TIP_SPEED_RATIO, PITCH_DEG))
-    again = load_coefficients(blade, TIP_SPEED_RATIO[i], np.radians(PITCH_DEG[j]))
+    again = load_coefficients(
+        blade, TIP_SPEED_RATIO[i], np.radians(PITCH_DEG[j]), has_skewed_wake(parameters)
+    )
     # Rounding of sin and exp differs between machines; difference quotients enlarge it by 1/step.
     if not np.allclose(again, coefficients[:, i, j], rtol=1e-7, atol=1e-9):
         worst = np.abs(again - coefficients[:, i, j]).max()
@@ -66,7 +69,7 @@ def main() -> int:
         parameters = read_turbine_file(name)
         blade, inputs = turbine_blade(parameters)
         path = Path(parameters["aerodynamics"]["tables"])
-        write_tables(path, build_tables(blade), inputs)
+        write_tables(path, build_tables(blade, has_skewed_wake(parameters)), inputs)
         print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
     return 0
 

@@ -110,17 +110,18 @@ def rotor_loads(
     y: ArrayLike = 0.0,
     flap: ArrayLike = 0.0,
     edge: ArrayLike = 0.0,
+    skew: ArrayLike = 0.0,
 ) -> Array:
     """Coefficients (6, ...) of LOAD_NAMES of one blade; the arguments broadcast against each other.
 
     tip_speed_ratio: rotor speed * R / V; pitch [rad], positive to feather. kappa: the wind at r is V (1 +
     kappa r / R). y: uniform in-plane air velocity along e2, by V. flap, edge: modal velocities by V; pitch
-    turns the modes. Torque and bending are moments about the apex; flap and edge are generalised forces of
-    the modes.
+    turns the modes. skew: in-plane wind along the blade, by V: the wake leans that way and the blade sees more of
+    it (`_skewed`). Torque and bending are moments about the apex; flap and edge are generalised forces of the modes.
     """
-    arguments = [np.asarray(v, dtype=float) for v in (tip_speed_ratio, pitch, kappa, y, flap, edge)]
+    arguments = [np.asarray(v, dtype=float) for v in (tip_speed_ratio, pitch, kappa, y, flap, edge, skew)]
     shape = np.broadcast_shapes(*(v.shape for v in arguments))
-    lam, theta, kappa, y, flap, edge = (np.broadcast_to(v, shape).reshape(-1, 1) for v in arguments)
+    lam, theta, kappa, y, flap, edge, skew = (np.broadcast_to(v, shape).reshape(-1, 1) for v in arguments)
     r, big_r, cos_cone = blade.radius, blade.rotor_radius, np.cos(blade.cone)
     c, s = np.cos(theta), np.sin(theta)
     flap_x, flap_y, edge_x, edge_y = blade.shapes.T
@@ -129,10 +130,13 @@ def rotor_loads(
     normal = (1.0 + kappa * r / big_r) * cos_cone - (c * speed_x + s * speed_y)
     in_plane = lam * r / big_r * cos_cone + y - (c * speed_y - s * speed_x)
     angle = inflow_angle(blade, normal, in_plane, theta)
+    lift = _coefficient(blade.lift, angle - blade.twist - theta)
+    speed = normal / _balance(blade, lift, angle)[0]
+    if np.any(skew):
+        speed, angle = _skewed(normal, speed, angle, skew * r / big_r)
     attack = angle - blade.twist - theta
     lift, drag = (_coefficient(polars, attack) for polars in (blade.lift, blade.drag))
-    ratio, _ = _balance(blade, lift, angle)
-    pressure = blade.chord * (normal / ratio) ** 2 * (3.0 / (np.pi * big_r**2))
+    pressure = blade.chord * speed**2 * (3.0 / (np.pi * big_r**2))
     along_1 = pressure * (lift * np.cos(angle) + drag * np.sin(angle))
     driving = pressure * (lift * np.sin(angle) - drag * np.cos(angle))
     n, t = (along_1 @ blade.weights.T).T, (driving @ blade.weights.T).T
@@ -145,6 +149,19 @@ def rotor_loads(
         *((c * n[i] + s * n[i + 1]) - (c * t[i + 1] - s * t[i]) for i in (2, 4)),
     ]
     return np.stack(loads).reshape(len(LOAD_NAMES), *shape)
+
+
+def _skewed(normal: Array, speed: Array, angle: Array, lean: Array) -> tuple[Array, Array]:
+    """Speed and angle of the flow where the wake leans by `lean` = (in-plane wind along the blade / V) (r / R).
+
+    Pitt & Peters' redistribution, as OpenFAST's default: a (1 + 15 pi/32 tan(chi/2) r/R cos psi), with the wake's skew chi =
+    (1 + 0.6 a) times that of the wind, linear in the angle. Source: Burton et al., Wind Energy Handbook, 3.10; Ning et al. (2015),
+    doi:10.2514/6.2015-0215.
+    """
+    induced = 1.0 - speed * np.sin(angle) / normal
+    axial = normal * (1.0 - induced * (1.0 + 15 * np.pi / 64 * (1.0 + 0.6 * induced) * lean))
+    in_plane = speed * np.cos(angle)
+    return np.hypot(axial, in_plane), np.arctan2(axial, in_plane)
 
 
 def power_coefficient(blade: BladeAerodynamics, tip_speed_ratio: ArrayLike, pitch: ArrayLike) -> Array:

@@ -122,7 +122,7 @@ ACCELERATION = sp.symbols("add sdd f1dd f2dd f3dd edd phidd gendd", real=True)
 WIND = sp.symbols("v kv kh", real=True)
 SINE, COSINE = sp.symbols("sin_phi cos_phi", real=True)
 
-# Coefficients of one blade's aerodynamic loads; the equations need the first 24, the load channels all 30.
+# Coefficients of one blade's aerodynamic loads; the equations read the first 32 (whole vectors of 8), the load channels all.
 TABLES = (
     "thrust", "thrust_kappa", "thrust_y", "thrust_flap", "thrust_edge",
     "flap", "flap_kappa", "flap_y", "flap_flap", "flap_edge",
@@ -130,9 +130,10 @@ TABLES = (
     "edge", "edge_flap", "edge_edge",
     "tangential_kappa", "tangential_y", "tangential_flap",
     "bending_kappa", "bending_y", "bending_flap",
-    "tangential", "tangential_edge", "bending", "bending_edge", "edge_kappa", "edge_y",
+    "thrust_skew", "flap_skew", "torque_skew", "tangential_skew", "bending_skew",
+    "tangential", "tangential_edge", "bending", "bending_edge", "edge_kappa", "edge_y", "edge_skew",
 )  # fmt: skip
-TABLES_OF_THE_EQUATIONS = 24
+TABLES_OF_THE_EQUATIONS = 32
 
 HALF_SQRT3 = sp.sqrt(3) / 2
 BLADE_AZIMUTH = (
@@ -572,13 +573,14 @@ class Aerodynamics:
     normal: sp.Expr  # V
     kappa: tuple[sp.Expr, sp.Expr]  # V kappa_i
     inplane: tuple[sp.Expr, sp.Expr]  # V y_i
+    skew: tuple[sp.Expr, sp.Expr]  # in-plane wind along the blade, outwards
     pressure: sp.Expr  # rho A V / 6: a blade's third of rho/2 A V
 
     def load(self, name: str, number: int) -> sp.Expr:
         """One blade's coefficient times velocity; times `pressure` (and R) it is the load."""
         c, s = BLADE_AZIMUTH[number - 1]
         total = TABLE[name] * self.normal
-        for key, (pc, ps) in (("kappa", self.kappa), ("y", self.inplane)):
+        for key, (pc, ps) in (("kappa", self.kappa), ("y", self.inplane), ("skew", self.skew)):
             total += TABLE[f"{name}_{key}"] * (pc * c + ps * s) if f"{name}_{key}" in TABLE else 0
         flap = TABLE[f"{name}_flap"] * STATE[9 + number]
         return total + flap + (TABLE[f"{name}_edge"] * STATE[13] if f"{name}_edge" in TABLE else 0)
@@ -593,7 +595,8 @@ class Aerodynamics:
         out = []
         for i, weight in enumerate(("cos", "sin")):
             flap = TABLE[f"{name}_flap"] * sp.Symbol(f"sum_d_{weight}", real=True)
-            periodic = TABLE[f"{name}_kappa"] * self.kappa[i] + TABLE[f"{name}_y"] * self.inplane[i]
+            parts = ("kappa", self.kappa), ("y", self.inplane), ("skew", self.skew)
+            periodic = sum(TABLE[f"{name}_{key}"] * part[i] for key, part in parts)
             out.append(sp.Rational(3, 2) * periodic + flap)
         return out[0], out[1]
 
@@ -613,7 +616,10 @@ def inflow(sheet: Sheet, m: Motion) -> Aerodynamics:
     normal = relative[0]
     sheet.lines.append((TIP_SPEED_RATIO, radius * m.omega[0] / normal))
     pressure = sheet.let("pressure", sheet.constant(P["q_area"] / 3) * normal)
-    return Aerodynamics(normal, (kc, ks), (relative[1], relative[2]), pressure)
+    # e3 = (0, -sin, cos): a blade that points where the wind blows across the rotor lies in more of the wake. The wake leans with the
+    # wind; it does not follow the tower's swaying.
+    skew = tuple(sheet.let(f"skew_{n}", x) for n, x in (("cos", wind[2]), ("sin", -wind[1])))
+    return Aerodynamics(normal, (kc, ks), (relative[1], relative[2]), skew, pressure)
 
 
 def aero_resultant(sheet: Sheet, aero: Aerodynamics) -> tuple[sp.Matrix, sp.Matrix]:

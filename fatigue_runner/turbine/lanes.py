@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 _rhs, _loads = kernel.rhs, kernel.loads
 _SCRATCH = max(kernel.RHS_ROWS, kernel.LOADS_ROWS) * LANES
-_ROW = 32 * LANES
+_ROW = len(kernel.TABLES) * LANES
 
 
 @njit(nogil=True)

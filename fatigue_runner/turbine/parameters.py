@@ -152,7 +152,15 @@ def generator_law(generator: Mapping[str, Any]) -> dict[str, float]:
     law = generator["law"]
     if law == "optimal":
         # the line and the power limit are out of reach, but not so far that rounding swallows the torque
-        return {"tg_k": gain, "tg_a2": 0.0, "tg_ws": 0.0, "tg_t2": -_FAR, "tg_p": 0.0, "tg_t": _FAR, "tg_e": 0.0}
+        return {
+            "tg_k": gain,
+            "tg_a2": 0.0,
+            "tg_ws": 0.0,
+            "tg_t2": -_FAR,
+            "tg_p": 0.0,
+            "tg_t": _FAR,
+            "tg_e": 0.0,
+        }
     if law != "regions":
         raise InputError(f"generator: unknown law {law!r}{did_you_mean(str(law), ('optimal', 'regions'))}")
     r = generator["regions"]

@@ -18,13 +18,51 @@ AZIMUTHS = 24  # of one revolution; three blades and up to the second harmonic r
 
 
 def _states(unknown: Array, azimuths: Array, ratio: float) -> Array:
-    """(16, n) from (fore-aft, side-side, flap, edge, shaft twist, rotor speed), at rest but for the rotation."""
-    a, s, f, e, twist, speed = unknown
+    """(16, n) from (fore-aft, side-side, flap, its cosine and sine over the azimuth, edge, shaft twist, rotor speed)."""
+    a, s, f, fc, fs, e, twist, speed = unknown
     x = np.zeros((16, len(azimuths)))
-    x[0], x[1], x[2:5], x[5] = a, s, f, e
+    psi = azimuths + np.arange(3)[:, None] * 2 * np.pi / 3
+    x[0], x[1], x[5] = a, s, e
+    x[2:5] = f + fc * np.cos(psi) + fs * np.sin(psi)
+    x[10:13] = speed * (fs * np.cos(psi) - fc * np.sin(psi))
     x[6], x[7] = azimuths, ratio * (azimuths - twist)
     x[14], x[15] = speed, ratio * speed
     return x
+
+
+def _steady(
+    turbine: Turbine, wind: float, vertical_shear: float, horizontal_shear: float, pitch: float
+) -> Array:
+    """The unknowns of `_states` that balance the mean of every equation, and the once-per-revolution part of the flap's."""
+    from scipy.optimize import root
+
+    if not wind > 0:
+        raise InputError(f"operating point: the wind speed must be positive, got {wind} m/s")
+    p = turbine.parameters
+    ratio, azimuths = p["g_ratio"], np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
+    psi = azimuths + np.arange(3)[:, None] * 2 * np.pi / 3
+    scale = np.array([0.1, 0.01, 1.0, 0.1, 0.1, 0.1, 1e-3, 1.0])
+
+    def residual(z: Array) -> Array:
+        unknown = z * scale
+        x = _states(unknown, azimuths, ratio)
+        acc = turbine.rhs(x, wind, vertical_shear, horizontal_shear, pitch)[8:]
+        swing = x[2:5] - unknown[2]
+        flap = (acc[2:5] + unknown[7] ** 2 * swing) / 50
+        mean = acc.mean(axis=1)
+        harmonics = (flap * np.cos(psi)).mean(), (flap * np.sin(psi)).mean()
+        return np.array([mean[0], mean[1], flap.mean(), *harmonics, mean[5] / 50, mean[6], mean[7] / ratio])
+
+    # from the fastest rotation down, so that the point right of the power maximum is found, not the stalled one
+    for tip_speed_ratio in (7.5, 9.0, 6.0, 5.0, 10.5, 4.0, 3.0, 12.0):
+        start = np.array([1.0, -0.5, wind * 0.35, 0.0, 0.0, 0.1, 2.0, tip_speed_ratio * wind / p["radius"]])
+        found = root(residual, start, tol=1e-11)
+        if found.success and np.abs(found.fun).max() < 1e-6 and found.x[7] > 0.02:
+            return found.x * scale
+    raise InputError(
+        f"{turbine.name} has no steady rotation at {wind:g} m/s and {np.degrees(pitch):g} deg pitch; "
+        "give `initial` explicitly"
+    )
 
 
 def operating_point(
@@ -36,28 +74,8 @@ def operating_point(
     pitch: float,
 ) -> Array:
     """See Turbine.operating_point."""
-    from scipy.optimize import root
-
-    if not wind > 0:
-        raise InputError(f"operating point: the wind speed must be positive, got {wind} m/s")
-    p = turbine.parameters
-    ratio, azimuths = p["g_ratio"], np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
-    scale = np.array([0.1, 0.01, 1.0, 0.1, 1e-3, 1.0])
-
-    def residual(z: Array) -> Array:
-        x = _states(z * scale, azimuths, ratio)
-        acc = turbine.rhs(x, wind, vertical_shear, horizontal_shear, pitch)[8:].mean(axis=1)
-        return np.array([acc[0], acc[1], acc[2:5].mean() / 50, acc[5] / 50, acc[6], acc[7] / ratio])
-
-    # from the fastest rotation down, so that the point right of the power maximum is found, not the stalled one
-    for tip_speed_ratio in (7.5, 9.0, 6.0, 5.0, 10.5, 4.0, 3.0, 12.0):
-        start = np.array([1.0, -0.5, wind * 0.35, 0.1, 2.0, tip_speed_ratio * wind / p["radius"]])
-        found = root(residual, start, tol=1e-11)
-        if found.success and np.abs(found.fun).max() < 1e-6 and found.x[5] > 0.02:
-            return _states(found.x * scale, np.array([azimuth]), ratio)[:, 0]
-    raise InputError(
-        f"{turbine.name} has no steady rotation at {wind:g} m/s and {np.degrees(pitch):g} deg pitch; give `initial` explicitly"
-    )
+    unknown = _steady(turbine, wind, vertical_shear, horizontal_shear, pitch)
+    return _states(unknown, np.array([azimuth]), turbine.parameters["g_ratio"])[:, 0]
 
 
 def _multiblade(azimuth: float, speed: float) -> tuple[Array, Array, Array]:
@@ -76,14 +94,12 @@ def _multiblade(azimuth: float, speed: float) -> tuple[Array, Array, Array]:
 
 def linearised(turbine: Turbine, wind: float, pitch: float = 0.0) -> Array:
     """(16, 16) state matrix about the operating point in multiblade coordinates, averaged over the azimuth."""
-    base = operating_point(turbine, wind, 0.0, 0.0, 0.0, pitch)
-    ratio, speed = turbine.parameters["g_ratio"], base[14]
+    unknown = _steady(turbine, wind, 0.0, 0.0, pitch)
+    ratio, speed = turbine.parameters["g_ratio"], unknown[7]
     total = np.zeros((16, 16))
     delta = np.array([1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-4, 1e-6, 1e-4] * 2)
     for azimuth in np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
-        x = base.copy()
-        x[6] += azimuth
-        x[7] += ratio * azimuth
+        x = _states(unknown, np.array([azimuth]), ratio)[:, 0]
         shifts = np.concatenate([np.diag(delta), -np.diag(delta)], axis=1)
         acc = turbine.rhs(x[:, None] + shifts, wind, pitch=pitch)[8:]
         jacobian = (acc[:, :16] - acc[:, 16:]) / (2 * delta)

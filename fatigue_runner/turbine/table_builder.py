@@ -26,9 +26,22 @@ Array = NDArray[np.float64]
 
 # Half widths of the central differences, by the wind speed; those in the rotor plane grow with the tip-speed
 # ratio, so that they turn the flow as much as the others and yet never turn it round near the hub.
-STEPS = {"kappa": 0.05, "y": 0.02, "flap": 0.05, "edge": 0.05}
+STEPS = {"kappa": 0.05, "y": 0.02, "flap": 0.05, "edge": 0.05, "skew": 0.05}
 IN_PLANE = ("y", "edge")
-TABLE_NAMES = tuple(name + suffix for name in LOAD_NAMES for suffix in ("", *(f"_{step}" for step in STEPS)))
+
+
+def perturbations(skewed_wake: bool) -> tuple[str, ...]:
+    """The derivatives that a turbine's tables hold; `aerodynamics: skewed_wake` of the turbine file."""
+    return tuple(name for name in STEPS if skewed_wake or name != "skew")
+
+
+def table_names(skewed_wake: bool) -> tuple[str, ...]:
+    """Each load, then its derivatives."""
+    suffixes = ("", *(f"_{step}" for step in perturbations(skewed_wake)))
+    return tuple(name + suffix for name in LOAD_NAMES for suffix in suffixes)
+
+
+TABLE_NAMES = table_names(True)
 
 TIP_SPEED_RATIO = np.linspace(0.5, 15.0, 117)
 PITCH_DEG = np.concatenate([np.arange(-5.0, 10.0, 0.5), np.arange(10.0, 30.5, 1.0)])
@@ -36,21 +49,33 @@ PITCH_DEG = np.concatenate([np.arange(-5.0, 10.0, 0.5), np.arange(10.0, 30.5, 1.
 _FORMAT = 1  # raise when the method changes, so that tables made before are known to be old
 
 
-def load_coefficients(blade: BladeAerodynamics, tip_speed_ratio: Array, pitch: Array) -> Array:
-    """Loads and derivatives (30, ...) in the order of TABLE_NAMES; the arguments broadcast, pitch in rad."""
+def load_coefficients(
+    blade: BladeAerodynamics, tip_speed_ratio: Array, pitch: Array, skewed_wake: bool = True
+) -> Array:
+    """Loads and derivatives (k, ...) in the order of `table_names`; the arguments broadcast, pitch in rad."""
     rows = [rotor_loads(blade, tip_speed_ratio, pitch)]
-    for name, size in STEPS.items():
+    for name in perturbations(skewed_wake):
+        size = STEPS[name]
         step = size * (tip_speed_ratio if name in IN_PLANE else np.ones_like(tip_speed_ratio))
         above, below = (rotor_loads(blade, tip_speed_ratio, pitch, **{name: s}) for s in (step, -step))
         rows.append((above - below) / (2 * step))
-    return np.stack(rows, axis=1).reshape(len(TABLE_NAMES), *rows[0].shape[1:])
+    return np.stack(rows, axis=1).reshape(len(rows) * len(LOAD_NAMES), *rows[0].shape[1:])
 
 
 def build_tables(
-    blade: BladeAerodynamics, tip_speed_ratio: Array = TIP_SPEED_RATIO, pitch_deg: Array = PITCH_DEG
+    blade: BladeAerodynamics,
+    skewed_wake: bool = True,
+    tip_speed_ratio: Array = TIP_SPEED_RATIO,
+    pitch_deg: Array = PITCH_DEG,
 ) -> Array:
-    """Coefficients (30, n, k) of TABLE_NAMES over tip-speed ratios (n,) and pitch angles (k,) [deg]."""
-    return np.stack([load_coefficients(blade, tip_speed_ratio, np.radians(p)) for p in pitch_deg], axis=-1)
+    """Coefficients (m, n, k) of `table_names` over tip-speed ratios (n,) and pitch angles (k,) [deg]."""
+    columns = [load_coefficients(blade, tip_speed_ratio, np.radians(p), skewed_wake) for p in pitch_deg]
+    return np.stack(columns, axis=-1)
+
+
+def has_skewed_wake(parameters: Mapping[str, Any]) -> bool:
+    """Whether the turbine file asks for the skewed wake; without the key it has one."""
+    return bool(parameters["aerodynamics"].get("skewed_wake", True))
 
 
 def turbine_blade(parameters: Mapping[str, Any]) -> tuple[BladeAerodynamics, str]:
@@ -88,17 +113,20 @@ def inputs_hash(parameters: Mapping[str, Any], airfoils: Mapping[str, Any]) -> s
         "grid": [TIP_SPEED_RATIO.tolist(), PITCH_DEG.tolist()],
         "geometry": {k: geometry[k] for k in ("blades", "hub_radius", "tip_radius", "precone_deg")},
         "shapes": [blade["flap_mode"], blade["edge_mode"], blade["stations"]],
-        "aerodynamics": {k: v for k, v in aerodynamics.items() if k not in ("tables", "airfoils", "interpolation")},
+        "aerodynamics": {
+            k: v for k, v in aerodynamics.items() if k not in ("tables", "airfoils", "interpolation")
+        },
         "airfoils": airfoils["airfoils"],
     }
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
 
 
 def write_tables(path: Path, coefficients: Array, inputs: str) -> None:
-    """Write an npz: names (30,), tip_speed_ratio (n,), pitch (k,) [rad], coefficients (30, n, k), inputs."""
+    """Write an npz: names (m,), tip_speed_ratio (n,), pitch (k,) [rad], coefficients (m, n, k), inputs."""
+    names = next(n for n in (table_names(True), table_names(False)) if len(n) == len(coefficients))
     np.savez_compressed(
         path,
-        names=np.array(TABLE_NAMES),
+        names=np.array(names),
         tip_speed_ratio=TIP_SPEED_RATIO,
         pitch=np.radians(PITCH_DEG),
         coefficients=coefficients,
@@ -120,5 +148,5 @@ def make_tables(name: str) -> Path:
             f"turbine {name}: its tables are the shipped {path.name}; give your own file as `aerodynamics: tables:`"
         )
     blade, inputs = turbine_blade(parameters)
-    write_tables(path, build_tables(blade), inputs)
+    write_tables(path, build_tables(blade, has_skewed_wake(parameters)), inputs)
     return path

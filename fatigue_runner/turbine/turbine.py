@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.turbine.parameters import (
-    DATA,
     at_pitch,
     checked,
     equation_parameters,
@@ -93,7 +92,7 @@ class Turbine:
         azimuth: float = 0.0,
         pitch: float = 0.0,
     ) -> Array:
-        """(16,) state at which the accelerations vanish in the mean over a revolution; azimuth and pitch [rad].
+        """(16,) state of steady rotation: mean loads and the flap's swing over a revolution are balanced; azimuth and pitch [rad].
 
         Raises InputError where the turbine has no steady rotation at this wind and pitch.
         """

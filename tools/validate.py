@@ -1,0 +1,153 @@
+"""Print the check values of docs/validation.md: what others published or ran, what this model gives, and the difference.
+
+python tools/validate.py            a table in the terminal
+python tools/validate.py --markdown the tables of docs/validation.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from fatigue_runner.integrators import simulate_block
+from fatigue_runner.turbine import load_turbine
+from fatigue_runner.turbine.aerodynamics import power_coefficient, thrust_coefficient
+from fatigue_runner.turbine.beam import blade_modes, tower_modes
+from fatigue_runner.turbine.finite_elements import blade_beam, clamped_frequencies
+from fatigue_runner.turbine.parameters import read_turbine_file
+from fatigue_runner.turbine.table_builder import turbine_blade
+from fatigue_runner.wind import ConstantWind
+
+REPORT = "NREL/TP-500-38060"
+OPENFAST = "OpenFAST 5.0"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One published value beside ours."""
+
+    section: str
+    name: str
+    source: str
+    published: float
+    ours: float
+    unit: str
+
+    @property
+    def difference(self) -> float:
+        return self.ours / self.published - 1
+
+
+def structure() -> Iterator[Check]:
+    data = read_turbine_file("nrel5mw")
+    blade, tower = blade_modes(data), tower_modes(data)
+    section = "Blade and tower"
+    yield Check(section, "blade mass", REPORT, 17740, blade.mass, "kg")
+    yield Check(section, "blade first moment about the root", REPORT, 363231, blade.first_moment, "kg·m")
+    yield Check(section, "blade second moment about the root", REPORT, 11776047, blade.second_moment, "kg·m²")
+    yield Check(section, "tower mass", REPORT, 347460, tower.mass, "kg")
+    yield Check(section, "tower centre of mass", REPORT, 38.234, tower.first_moment / tower.mass, "m")
+    elements, _ = clamped_frequencies(blade_beam(data), count=2)
+    yield Check(
+        section,
+        "clamped blade, flap: our finite elements",
+        "finite elements",
+        elements[0],
+        blade.flap_frequency,
+        "Hz",
+    )
+    yield Check(
+        section,
+        "clamped blade, edge: our finite elements",
+        "finite elements",
+        elements[1],
+        blade.edge_frequency,
+        "Hz",
+    )
+
+
+def rotor() -> Iterator[Check]:
+    blade, _ = turbine_blade(read_turbine_file("t2b1i1cg"))
+    ratios = np.array([5.0, 7.0, 7.55, 9.0, 10.0])
+    ours = power_coefficient(blade, ratios, np.zeros(5)), thrust_coefficient(blade, ratios, np.zeros(5))
+    published = (0.355, 0.480, 0.485, 0.469, 0.443), (0.513, 0.750, 0.788, 0.867, 0.912)
+    for label, theirs, mine in zip(("power", "thrust"), published, ours, strict=True):
+        for ratio, a, b in zip(ratios, theirs, mine, strict=True):
+            name = f"{label} coefficient at tip-speed ratio {ratio:g}"
+            yield Check("Rigid rotor, pitch 0, no tilt, no cone", name, OPENFAST, a, float(b), "-")
+
+
+def operation() -> Iterator[Check]:
+    published = {
+        "nrel5mw": (9.127, 20.05, 0.197, 3.155, 5692.0, 33269.0),
+        "t2b1i1cg": (9.130, 20.06, 0.205, 2.848, 4928.0, 34083.0),
+    }
+    for name, values in published.items():
+        turbine = load_turbine(name)
+        start = turbine.operating_point(8.0)[None]
+        run = simulate_block(turbine, "dop853", 0.05, [ConstantWind(8.0)], start, 300.0, 0.05)[0]
+        late = run.time >= 200.0
+        mean = {k: v[late].mean() for k, v in run.loads.items()}
+        ours = (
+            ("rotor speed", run.state[late, 14].mean() * 30 / np.pi, "rpm"),
+            ("generator torque", mean["generator_torque"] / 1e3, "kN·m"),
+            ("tower top fore-aft", run.state[late, 0].mean(), "m"),
+            ("tip out of plane", mean["blade1_tip_out_of_plane"], "m"),
+            ("flap root moment", mean["blade1_root_flapwise_moment"] / 1e3, "kN·m"),
+            ("tower-base fore-aft moment", mean["tower_base_fore_aft_moment"] / 1e3, "kN·m"),
+        )
+        for (label, value, unit), theirs in zip(ours, values, strict=True):
+            yield Check(f"Means at 8 m/s, {name}", label, OPENFAST, theirs, float(value), unit)
+
+
+def modes() -> Iterator[Check]:
+    published = {
+        "tower side-side": (0.3213, 0.54), "tower fore-aft": (0.3349, 6.5), "flap regressing": (0.58, None),
+        "flap collective": (0.72, None), "flap progressing": (0.84, None),
+        "drivetrain and collective edge 1": (1.744, 5.2), "drivetrain and collective edge 2": (3.802, 5.5),
+    }  # fmt: skip
+    section = "Modes at 8 m/s, nrel5mw (undamped natural frequency)"
+    for name, frequency, damping in load_turbine("nrel5mw").natural_frequencies(8.0):
+        theirs, their_damping = published[name]
+        yield Check(section, name, OPENFAST, theirs, frequency, "Hz")
+        if their_damping:
+            yield Check(section, f"{name}: damping ratio", OPENFAST, their_damping, 100 * damping, "%")
+
+
+def checks() -> list[Check]:
+    return [check for part in (structure, rotor, operation, modes) for check in part()]
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--markdown", action="store_true", help="print the tables of docs/validation.md")
+    markdown = parser.parse_args().markdown
+    section = ""
+    for c in checks():
+        if c.section != section:
+            section = c.section
+            print(
+                f"\n### {section}\n\n| | {c.source} | ours | difference |\n|---|---|---|---|"
+                if markdown
+                else f"\n{section}"
+            )
+        values = f"{c.published:.6g} {c.unit}", f"{c.ours:.6g} {c.unit}", f"{100 * c.difference:+.2f} %"
+        print(
+            "| " + " | ".join((c.name, *values)) + " |"
+            if markdown
+            else f"  {c.name:45s}{values[0]:>18s}{values[1]:>18s}{values[2]:>10s}"
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
