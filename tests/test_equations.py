@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import cadynturb
 import numpy as np
 import pytest
+from independent_model import IndependentModel
 
-import cadynturb
 from fatigue_runner.integrators import simulate_block
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.generated import kernel
 from fatigue_runner.turbine.parameters import at_pitch, equation_parameters, read_turbine_file
 from fatigue_runner.wind import ConstantWind
-from independent_model import IndependentModel
 
 RATIO = np.linspace(0.5, 15, 30)
 

@@ -144,7 +144,8 @@ def kernel(
     places = {c: i for i, c in enumerate(constants)}
     source = [
         "@njit(**FAST)",
-        f"def {name}(x, wind, {''.join(f'{a}, ' for a in extra_inputs)}out, start, tables, cells, constants, scratch, row, clamped):",
+        f"def {name}(x, wind, {''.join(f'{a}, ' for a in extra_inputs)}out, start, tables, cells, constants, "
+        "scratch, row, clamped):",
         f'        """{doc}"""'.replace("        ", "    ", 1),
     ]
     source += [f"    {c} = constants[{places[c]}]" for c in needed_constants]
@@ -220,11 +221,12 @@ def generate() -> str:
     out = dict(enumerate(eq.STATE[8:])) | {8 + i: a for i, a in enumerate(acc)}
     load_out = {i: loads[n] for i, n in enumerate(LOAD_NAMES)}
     tables = eq.TABLES[: eq.TABLES_OF_THE_EQUATIONS]
+    derivative = [sp.Symbol(f"v{i}_unused") for i in range(8)] + list(eq.ACCELERATION)
     kernels = [
         kernel("rhs", "State derivative of LANES cases: x, out[start:] in blocks (16, LANES), wind (3, LANES).",
                sheet, out, {}, tables, symbols),
-        kernel("loads", "Load channels of LANES states: x, derivative (16, LANES), wind (3, LANES), out (n_loads, LANES).",
-               load_sheet, load_out, {"derivative": [sp.Symbol(f"v{i}_unused") for i in range(8)] + list(eq.ACCELERATION)}, eq.TABLES, symbols),
+        kernel("loads", "Load channels of LANES states: x, derivative (16, LANES), wind (3, LANES), out (k, LANES).",
+               load_sheet, load_out, {"derivative": derivative}, eq.TABLES, symbols),
     ]  # fmt: skip
     lines = [f"    {name} = p[{name!r}]" for name in eq.PARAMETERS]
     lines += [f"    {s} = {PRINT(e)}" for s, e in definitions.items()]

@@ -135,17 +135,13 @@ def main() -> int:
     for c in checks():
         if c.section != section:
             section = c.section
-            print(
-                f"\n### {section}\n\n| | {c.source} | ours | difference |\n|---|---|---|---|"
-                if markdown
-                else f"\n{section}"
-            )
+            head = f"### {section}\n\n| | {c.source} | ours | difference |\n|---|---|---|---|"
+            print(f"\n{head if markdown else section}")
         values = f"{c.published:.6g} {c.unit}", f"{c.ours:.6g} {c.unit}", f"{100 * c.difference:+.2f} %"
-        print(
-            "| " + " | ".join((c.name, *values)) + " |"
-            if markdown
-            else f"  {c.name:45s}{values[0]:>18s}{values[1]:>18s}{values[2]:>10s}"
-        )
+        if markdown:
+            print("| " + " | ".join((c.name, *values)) + " |")
+        else:
+            print(f"  {c.name:45s}{values[0]:>18s}{values[1]:>18s}{values[2]:>10s}")
     return 0
 
 

@@ -155,8 +155,8 @@ def _skewed(normal: Array, speed: Array, angle: Array, lean: Array) -> tuple[Arr
     """Speed and angle of the flow where the wake leans by `lean` = (in-plane wind along the blade / V) (r / R).
 
     Pitt & Peters' redistribution, as OpenFAST's default: a (1 + 15 pi/32 tan(chi/2) r/R cos psi), with the wake's skew chi =
-    (1 + 0.6 a) times that of the wind, linear in the angle. Source: Burton et al., Wind Energy Handbook, 3.10; Ning et al. (2015),
-    doi:10.2514/6.2015-0215.
+    (1 + 0.6 a) times that of the wind, linear in the angle. Source: Burton et al., Wind Energy Handbook, 3.10;
+    Ning et al. (2015), doi:10.2514/6.2015-0215.
     """
     induced = 1.0 - speed * np.sin(angle) / normal
     axial = normal * (1.0 - induced * (1.0 + 15 * np.pi / 64 * (1.0 + 0.6 * induced) * lean))

@@ -616,8 +616,8 @@ def inflow(sheet: Sheet, m: Motion) -> Aerodynamics:
     normal = relative[0]
     sheet.lines.append((TIP_SPEED_RATIO, radius * m.omega[0] / normal))
     pressure = sheet.let("pressure", sheet.constant(P["q_area"] / 3) * normal)
-    # e3 = (0, -sin, cos): a blade that points where the wind blows across the rotor lies in more of the wake. The wake leans with the
-    # wind; it does not follow the tower's swaying.
+    # e3 = (0, -sin, cos): a blade that points where the wind blows across the rotor lies in more of the wake. The wake leans
+    # with the wind; it does not follow the tower's swaying.
     skew = tuple(sheet.let(f"skew_{n}", x) for n, x in (("cos", wind[2]), ("sin", -wind[1])))
     return Aerodynamics(normal, (kc, ks), (relative[1], relative[2]), skew, pressure)
 
@@ -776,7 +776,7 @@ def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Exp
 # --- load channels -----------------------------------------------------------------------------------------------------
 
 
-def full_motion(m: Motion, sheet: Sheet, name: str, spin_rate: sp.Expr = sp.Integer(0)) -> Motion:
+def full_motion(m: Motion, sheet: Sheet, name: str, spin_rate: sp.Expr | int = 0) -> Motion:
     """The same motion with the actual accelerations in `acceleration` and `spin`; `spin_rate`: extra spin about x."""
     add, sdd = ACCELERATION[0:2]
     spin = m.spin + m.w_a * add + m.w_s * sdd + sp.Matrix([spin_rate, 0, 0])

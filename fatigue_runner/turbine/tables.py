@@ -49,7 +49,8 @@ class AeroTables:
         low, high = float(self.pitch[0]), float(self.pitch[-1])
         if not low - 1e-9 <= pitch <= high + 1e-9:
             raise InputError(
-                f"pitch {np.degrees(pitch):g} deg is outside the aerodynamic table ({np.degrees(low):g} to {np.degrees(high):g} deg)"
+                f"pitch {np.degrees(pitch):g} deg is outside the aerodynamic table "
+                f"({np.degrees(low):g} to {np.degrees(high):g} deg)"
             )
         n = len(self.tip_speed_ratio)
         stack = np.stack(

@@ -92,8 +92,9 @@ class Turbine:
         azimuth: float = 0.0,
         pitch: float = 0.0,
     ) -> Array:
-        """(16,) state of steady rotation: mean loads and the flap's swing over a revolution are balanced; azimuth and pitch [rad].
+        """(16,) state of steady rotation: mean loads and the flap's swing over a revolution are balanced.
 
+        wind [m/s], shears [-], azimuth and pitch [rad].
         Raises InputError where the turbine has no steady rotation at this wind and pitch.
         """
         from fatigue_runner.turbine.steady import operating_point
@@ -173,6 +174,6 @@ def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:
     # tables from another program carry no such hash: whoever gives them answers for them
     if made_for and "airfoils" in data["aerodynamics"] and made_for != turbine_inputs(data):
         raise InputError(
-            f"aerodynamic tables {path} were made for another blade, cone or airfoil than turbine {data.get('name', '?')} has now; "
+            f"aerodynamic tables {path} were made for another blade, cone or airfoil than turbine {data.get('name', '?')} has; "
             "make them anew with `fatigue-runner turbine FILE --write-tables`"
         )

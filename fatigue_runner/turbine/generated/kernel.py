@@ -1172,7 +1172,7 @@ def rhs(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
 
 @njit(**FAST)
 def loads(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped):
-    """Load channels of LANES states: x, derivative (16, LANES), wind (3, LANES), out (n_loads, LANES)."""
+    """Load channels of LANES states: x, derivative (16, LANES), wind (3, LANES), out (k, LANES)."""
     b_m = constants[0]
     b_m1 = constants[1]
     b_m2 = constants[2]
