@@ -49,16 +49,20 @@ class Guard:
         if self.norm not in NORMS:
             raise CorrectorError(f"guard: norm must be one of {', '.join(NORMS)}, got {self.norm!r}")
         if not all(a > 0 for a in self.atol) or len(self.atol) != 16 or len(self.rtol) != 16:
-            raise CorrectorError("guard: atol needs 16 positive numbers: with 0 a state that crosses zero refuses every step")
+            raise CorrectorError(
+                "guard: atol needs 16 positive numbers: with 0 a state that crosses zero refuses every step"
+            )
         if not (self.kappa >= 1 and self.limit >= 0 and 0 < self.quantile <= 1):
-            raise CorrectorError("guard: kappa must be at least 1, limit not negative, quantile above 0 and at most 1")
+            raise CorrectorError(
+                "guard: kappa must be at least 1, limit not negative, quantile above 0 and at most 1"
+            )
 
 
 @dataclass(frozen=True)
 class Corrector:
     """N(x, p) of x+ = eta_h(x) + h^(p+1) N, for one turbine, method and step [s].
 
-    linear (16, k) or None acts on `features.names(kind, stages, factors)`; layers: (outputs, inputs + 1) matrices, the bias first, on the
+    linear (16, k) or None acts on `features.names(kind, stages, factors, history)`; layers: (outputs, inputs + 1) matrices, the bias first, on the
     same features without factors; their sum is h^(p+1) N divided by h^(p+1).
     """
 
@@ -79,6 +83,7 @@ class Corrector:
     training: Mapping[str, Any] = field(default_factory=dict)
     recipe: str = ""
     licence: str = "Apache-2.0"
+    history: int = 0
 
     def __post_init__(self) -> None:
         self._check_shapes()
@@ -94,9 +99,25 @@ class Corrector:
 
         feature_names.factor_rows(self.factors)
         if self.kind not in feature_names.KINDS or (self.kind == feature_names.RAW and self.factors):
-            raise CorrectorError(f"corrector {self.name}: features {self.kind!r} with factors {self.factors} do not exist")
+            raise CorrectorError(
+                f"corrector {self.name}: features {self.kind!r} with factors {self.factors} do not exist"
+            )
         stages = tableau(self.method).evaluations_per_step
-        base = len(feature_names.names(self.kind, stages))
+        if not 0 <= self.history <= feature_names.MOST_HISTORY or (
+            self.kind == feature_names.RAW and self.history
+        ):
+            raise CorrectorError(
+                f"corrector {self.name}: features {self.kind!r} that look back {self.history} steps do not exist"
+            )
+        if self.history and not self.guard.substeps:
+            raise CorrectorError(
+                f"corrector {self.name}: one that looks back starts with substeps; its guard must have them"
+            )
+        base = len(feature_names.names(self.kind, stages, (), self.history))
+        if base * (1 + len(self.factors)) > feature_names.MOST_ROWS:
+            raise CorrectorError(
+                f"corrector {self.name}: {base * (1 + len(self.factors))} features are more than {feature_names.MOST_ROWS}"
+            )
         if self.linear is None and not self.layers:
             raise CorrectorError(f"corrector {self.name}: it has neither a linear part nor layers")
         if self.linear is not None and self.linear.shape != (16, base * (1 + len(self.factors))):
@@ -106,7 +127,9 @@ class Corrector:
         width = base - 1
         for number, layer in enumerate(self.layers, start=1):
             if layer.ndim != 2 or layer.shape[1] != width + 1 or layer.shape[0] > 500:
-                raise CorrectorError(f"corrector {self.name}: layer {number} has shape {layer.shape}, it needs {width + 1} inputs")
+                raise CorrectorError(
+                    f"corrector {self.name}: layer {number} has shape {layer.shape}, it needs {width + 1} inputs"
+                )
             width = layer.shape[0]
         if self.layers and width != 16:
             raise CorrectorError(f"corrector {self.name}: the last layer has {width} outputs instead of 16")
@@ -141,7 +164,9 @@ class Corrector:
             for number, layer in enumerate(self.layers):
                 value = layer[:, 0] + value @ layer[:, 1:].T
                 if number < len(self.layers) - 1:
-                    value = np.maximum(value, 0) if self.activation == "relu" else value / np.sqrt(1 + value**2)
+                    value = (
+                        np.maximum(value, 0) if self.activation == "relu" else value / np.sqrt(1 + value**2)
+                    )
             out += value
         return out * self.step ** (self.order + 1)
 
@@ -161,7 +186,16 @@ class Corrector:
         net = np.concatenate(packed) if packed else np.zeros(0)
         kind = {"identity": IDENTITY, "relu": RELU, "isru": ISRU}[self.activation]
         factors = np.array(feature_names.factor_rows(self.factors), dtype=np.int64)
-        return (self.kind == feature_names.RAW, ratio, factors, linear, net, np.array(sizes), kind)
+        return (
+            self.kind == feature_names.RAW,
+            ratio,
+            self.history,
+            factors,
+            linear,
+            net,
+            np.array(sizes),
+            kind,
+        )
 
     def with_guard(self, guard: Guard) -> Corrector:
         return replace(self, guard=guard)
@@ -201,13 +235,19 @@ def load(path: Path | str) -> Corrector:
             metadata = f.metadata() or {}
             tensors = {k: f.get_tensor(k) for k in f.keys()}  # noqa: SIM118 - not a mapping
     except (SafetensorError, OSError, ValueError) as error:
-        raise CorrectorError(f"{path} is not a whole safetensors file ({error}); copy or train it anew") from None
+        raise CorrectorError(
+            f"{path} is not a whole safetensors file ({error}); copy or train it anew"
+        ) from None
     if metadata.get("format") != FORMAT:
-        raise CorrectorError(f"{path} is no corrector of this program (format {metadata.get('format')!r}, expected {FORMAT!r})")
+        raise CorrectorError(
+            f"{path} is no corrector of this program (format {metadata.get('format')!r}, expected {FORMAT!r})"
+        )
     try:
         header = json.loads(metadata["header"])
         count = header.pop("layers")
-        header["guard"] = Guard(**{k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()})
+        header["guard"] = Guard(
+            **{k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()}
+        )
         header["wind_range"], header["factors"] = tuple(header["wind_range"]), tuple(header["factors"])
         layers = tuple(tensors[f"layer{i}"].astype(float) for i in range(count))
         linear = tensors.get("linear")

@@ -13,11 +13,12 @@ STAGE_AWARE, RAW = "stage-aware", "raw"
 KINDS = (STAGE_AWARE, RAW)
 
 
-def stage_aware(stages: int) -> tuple[str, ...]:
+def stage_aware(stages: int, history: int = 0) -> tuple[str, ...]:
     """1, deflections and velocities with the shaft twist for the azimuths, wind at the step's start, middle and end, sine and cosine
-    of the azimuth, and h times the accelerations of every stage [SI]."""
+    of the azimuth, h times the accelerations of every stage, and those at the start of `history` steps before [SI]."""
     wind = tuple(f"{w}@{at}" for at in ("start", "middle", "end") for w in _WIND)
     accelerations = tuple(f"step*{r}_derivative@stage{i + 1}" for i in range(stages) for r in _RATES)
+    accelerations += tuple(f"step*{r}_derivative@step-{i + 1}" for i in range(history) for r in _RATES)
     return ("one", *_DEFLECTIONS, "shaft_twist", *_RATES, *wind, "sin_azimuth", "cos_azimuth", *accelerations)
 
 
@@ -30,9 +31,13 @@ def raw() -> tuple[str, ...]:
 FACTORS = ("sin_azimuth", "cos_azimuth", "wind_speed@start", "rotor_speed")
 
 
-def names(kind: str, stages: int, factors: tuple[str, ...] = ()) -> tuple[str, ...]:
+MOST_HISTORY = 4  # steps
+MOST_ROWS = 512  # room of the compiled loop for features and their products
+
+
+def names(kind: str, stages: int, factors: tuple[str, ...] = (), history: int = 0) -> tuple[str, ...]:
     """Feature names; for each factor, all of them times it are appended."""
-    base = raw() if kind == RAW else stage_aware(stages)
+    base = raw() if kind == RAW else stage_aware(stages, history)
     return (*base, *(f"{n}*{f}" for f in factors for n in base))
 
 

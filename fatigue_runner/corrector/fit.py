@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def affine(features: Array, defects: Array, ridge: float = 1e-9) -> Array:
+def affine(features: Array, defects: Array, ridge: float = 1e-12) -> Array:
     """(16, k) weights W that minimise |defects - features W^T|^2, each column scaled to unit size, with a small ridge.
 
     features (n, k), defects (n, 16). The ridge is relative to the scaled features: it only settles directions that the data leave open.

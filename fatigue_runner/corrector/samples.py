@@ -15,27 +15,35 @@ from fatigue_runner.integrators import method as find_method
 from fatigue_runner.integrators import simulate_block
 
 if TYPE_CHECKING:
+    from fatigue_runner.trajectory import Trajectory
     from fatigue_runner.turbine import Turbine
 
 Array = NDArray[np.float64]
 
 ACCURATE = "dop853"  # the method of the exact step
 SUBSTEPS = 8  # of it in one step: its local error is below 1e-9 of the defects for the steps of this project
+GRID = 0.1  # s, times at which steps are sampled where a corrector does not look back
 
 
 @dataclass
 class Samples:
-    """n single steps: rows (n, features) stage-aware, raw (n, 18), plain and exact results (n, 16)."""
+    """n single steps: rows (n, features) stage-aware, raw (n, 18), plain and exact results (n, 16), wind pieces (n, 4, 3)."""
 
     rows: Array
     raw: Array
     plain: Array
     exact: Array
+    pieces: Array | None = None
 
     @property
     def defect(self) -> Array:
         """Exact minus plain (n, 16): what a corrector is to give."""
         return self.exact - self.plain
+
+    @property
+    def state(self) -> Array:
+        """(n, 16) at the step's start."""
+        return self.raw[:, 1:17]
 
     def features(self, kind: str, factors: tuple[str, ...] = ()) -> Array:
         """(n, k) in the order of `features.names`."""
@@ -53,27 +61,33 @@ def wind_pieces(wind: Any, times: Array, step: float) -> Array:
 
 
 def single_steps(
-    turbine: Turbine, method: str, step: float, states: Array, pieces: Array, pitch: float = 0.0
+    turbine: Turbine,
+    method: str,
+    step: float,
+    states: Array,
+    pieces: Array,
+    pitch: float = 0.0,
+    accurate: str = ACCURATE,
+    substeps: int = SUBSTEPS,
 ) -> Samples:
-    """One step of `method` and one accurate step from each of states (n, 16) under wind pieces (n, 4, 3)."""
+    """One step of `method`, and one in `substeps` of `accurate`, from each of states (n, 16) under wind pieces (n, 4, 3)."""
     from fatigue_runner.integrators.correction import FIXED_ROWS, RAW_ROWS
     from fatigue_runner.integrators.defects import step_samples
     from fatigue_runner.integrators.kernel_data import runge_kutta_data
-    from fatigue_runner.turbine.lanes import from_groups, to_groups, work_space
+    from fatigue_runner.turbine.lanes import LANES, from_groups, to_groups, work_space
 
     n = len(states)
     x = to_groups(np.ascontiguousarray(states.T))
     cells = to_groups(np.ascontiguousarray(pieces.reshape(n, -1).T)).reshape(len(x), 4, -1)
-    own, accurate = runge_kutta_data(tableau(method)), runge_kutta_data(tableau(ACCURATE))
+    own, finer = runge_kutta_data(tableau(method)), runge_kutta_data(tableau(accurate))
     stages = len(own[0][3])
     count = FIXED_ROWS + 8 * stages
-    width = x.shape[1]
-    rows, raw = np.empty((len(x), count * width // 16)), np.empty((len(x), RAW_ROWS * width // 16))
+    rows, raw = np.empty((len(x), count * LANES)), np.empty((len(x), RAW_ROWS * LANES))
     plain, exact = np.empty_like(x), np.empty_like(x)
     data = turbine.kernel_data(pitch)
     scratch, row, clamped = work_space()
     step_samples(
-        x, cells, own[:2], stage_rows(stages), step, accurate[:2], SUBSTEPS, turbine.parameters["g_ratio"],
+        x, cells, own[:2], stage_rows(stages), step, finer[:2], substeps, turbine.parameters["g_ratio"],
         (data.tables, data.cells, data.constants, scratch, row), clamped, rows, raw, plain, exact,
     )  # fmt: skip
     return Samples(
@@ -81,6 +95,7 @@ def single_steps(
         from_groups(raw, RAW_ROWS, n).T.copy(),
         from_groups(plain, 16, n).T.copy(),
         from_groups(exact, 16, n).T.copy(),
+        pieces,
     )
 
 
@@ -97,8 +112,43 @@ def tableau(method: str) -> Any:
 
     found = find_method(method)
     if not isinstance(found, ButcherTableau):
-        raise InputError(f"correctors exist for Runge-Kutta methods only; {method} is none: use heun, rk3, rk4 or tsit5")
+        raise InputError(
+            f"correctors exist for Runge-Kutta methods only; {method} is none: use heun, rk3, rk4 or tsit5"
+        )
     return found
+
+
+def references(
+    turbine: Turbine, winds: Sequence[Any], initial: Array, duration: float, output: float, pitch: float = 0.0
+) -> list[Trajectory]:
+    """Accurate trajectories from initial (n, 16), sampled every `output` [s], in the order of the winds.
+
+    Raises InputError where one diverges: its defects would teach nothing.
+    """
+    from fatigue_runner.integrators import stability_limit
+
+    fine = min(0.05, stability_limit(turbine, ACCURATE) / 4)
+    runs: list[Any] = [None] * len(winds)
+    # winds with different time grids cannot share a block
+    for key in dict.fromkeys(w.cell_key for w in winds):
+        chosen = [i for i, w in enumerate(winds) if w.cell_key == key]
+        block = simulate_block(
+            turbine,
+            ACCURATE,
+            output / np.ceil(output / fine - 1e-9),
+            [winds[i] for i in chosen],
+            initial[chosen],
+            duration,
+            output,
+            pitch,
+        )
+        for i, run in zip(chosen, block, strict=True):
+            if run.diverged_at is not None:
+                raise InputError(
+                    f"training wind {winds[i].name}: the reference diverged at {run.diverged_at:g} s; leave this wind out of the recipe"
+                )
+            runs[i] = run
+    return runs
 
 
 def collect(
@@ -112,44 +162,68 @@ def collect(
     seed: int,
     initial: Array | None = None,
     pitch: float = 0.0,
+    history: int = 0,
+    runs: Sequence[Trajectory] | None = None,
 ) -> Samples:
     """Samples along accurate trajectories under `winds`, half of them moved off it.
 
-    per_wind samples of each wind at random times; perturbation: standard deviation of the move in units of each state's own.
-    Raises InputError where an accurate trajectory diverges: its defects would teach nothing.
+    per_wind samples of each wind at random times; perturbation: standard deviation of the move in units of each state's own (large
+    ones teach another mixture than a corrected run meets: 1e-5 to 1e-4 did best). history: steps looked back. runs: `references` of
+    the winds at `output_step(step, history)`, made here where none are given. Raises InputError where one diverges.
     """
-    from fatigue_runner.integrators import stability_limit
-
     rng = np.random.Generator(np.random.PCG64(seed))
-    if initial is None:
-        initial = np.array([turbine.operating_point(float(w.at(np.zeros(1))[0, 0]), pitch=pitch) for w in winds])
-    output = 0.1
-    fine = min(0.05, stability_limit(turbine, ACCURATE) / 4)
-    runs = []
-    # winds with different time grids cannot share a block
-    for key in dict.fromkeys(w.cell_key for w in winds):
-        chosen = [i for i, w in enumerate(winds) if w.cell_key == key]
-        block = simulate_block(
-            turbine, ACCURATE, output / round(output / fine), [winds[i] for i in chosen], initial[chosen], duration, output, pitch
-        )
-        runs += list(zip(chosen, block, strict=True))
-    for i, run in runs:
-        if run.diverged_at is not None:
-            raise InputError(
-                f"training wind {winds[i].label}: the reference diverged at {run.diverged_at:g} s; leave this wind out of the recipe"
-            )
-    scale = np.std(np.concatenate([run.state for _, run in runs]), axis=0)
+    if runs is None:
+        if initial is None:
+            initial = operating_points(turbine, winds, pitch)
+        runs = references(turbine, winds, initial, duration, output_step(step, history), pitch)
+    scale = np.std(np.concatenate([run.state for run in runs]), axis=0)
     ratio = turbine.parameters["g_ratio"]
-    states, pieces = [], []
-    for i, run in runs:
+    states, pieces, behind = [], [], []
+    for wind, run in zip(winds, runs, strict=True):
         last = int(np.searchsorted(run.time, run.time[-1] - step - 1e-9))
-        pick = rng.integers(0, max(last, 1), per_wind)
+        if last <= history:
+            raise InputError(
+                f"training wind {wind.name}: {run.time[-1]:g} s hold no step of {step:g} s; make it longer"
+            )
+        pick = rng.integers(history, last, per_wind)
         x = run.state[pick].copy()
         moved = slice(0, None, 2)
         x[moved] += _move(rng, x[moved].shape, scale, perturbation, ratio)
         states.append(x)
-        pieces.append(wind_pieces(winds[i], run.time[pick], step))
-    return single_steps(turbine, method, step, np.concatenate(states), np.concatenate(pieces), pitch)
+        pieces.append(wind_pieces(wind, run.time[pick], step))
+        if history:
+            slopes = step * accelerations(turbine, run, pitch)
+            looked = np.concatenate([slopes[pick - i] for i in range(1, history + 1)], axis=1)
+            looked[moved] += (
+                rng.standard_normal(looked[moved].shape) * np.tile(slopes.std(axis=0), history) * perturbation
+            )
+            behind.append(looked)
+    found = single_steps(turbine, method, step, np.concatenate(states), np.concatenate(pieces), pitch)
+    if history:
+        found.rows = np.concatenate([found.rows, np.concatenate(behind)], axis=1)
+    return found
+
+
+def output_step(step: float, history: int) -> float:
+    """Sampling [s] of the `references` that `collect` needs: a corrector that looks back needs its own steps."""
+    return step if history else GRID
+
+
+def operating_points(turbine: Turbine, winds: Sequence[Any], pitch: float = 0.0) -> Array:
+    """(n, 16) start of each wind: the operating point of its mean speed."""
+    return np.array([turbine.operating_point(w.mean_speed, pitch=pitch) for w in winds])
+
+
+def accelerations(turbine: Turbine, run: Trajectory, pitch: float = 0.0) -> Array:
+    """(n, 8) time derivatives of a trajectory's rates, of the shaft's twist in place of the generator's."""
+    from fatigue_runner.turbine.lanes import evaluate
+
+    data = turbine.kernel_data(pitch)
+    slopes = evaluate(data, np.ascontiguousarray(run.state.T), np.ascontiguousarray(run.wind.T))[0][
+        8:
+    ].T.copy()
+    slopes[:, 7] = slopes[:, 6] - slopes[:, 7] / turbine.parameters["g_ratio"]
+    return slopes
 
 
 def _move(rng: np.random.Generator, shape: tuple[int, ...], scale: Array, size: float, ratio: float) -> Array:

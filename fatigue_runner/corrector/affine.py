@@ -1,0 +1,285 @@
+"""Recipes of the closed-form families: winds, samples and a least-squares fit as data, from a YAML file to the artefact.
+
+name          of the artefact: `NAME.safetensors` beside the recipe
+family        `affine`: the defect is an affine map of the features (`features`); with `factors` one that varies with them
+turbine       `nrel5mw` (default), `t2b1i1cg` or the path of a turbine YAML
+method, step  the Runge-Kutta method and its step [s]
+factors       of `sin_azimuth`, `cos_azimuth`, `wind_speed@start`, `rotor_speed`; default none
+history       earlier steps that the map looks back to (default 0)
+training      winds, see below; `validation`: other winds, for the figures of the card
+samples       single steps per wind (default 500); half of them `perturbation` (1e-5 of each state's deviation) off the trajectory
+ridge         of the fit, relative to unit features (default 1e-12)
+seed          of the samples (default 0)
+guard         norm (`max`, `rms`), kappa (2), quantile (1: the largest), rtol (0), substeps (fallback; default as needed)
+
+Winds: `type: constant` with `speeds`, `vertical_shear`, `horizontal_shear` (lists, every combination), or `type: turbulent` with
+`speeds: {start, stop, count}`, `intensity: [low, high]`, `shear_exponent: [low, high]`, `seed`: one wind per speed, the two drawn;
+`duration` [s]; `initial`: `operating-point` (default) or `paper-spinning`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from fatigue_runner.corrector import features, fit, samples
+from fatigue_runner.corrector.artefact import Corrector, Guard
+from fatigue_runner.corrector.guard import from_training_set
+from fatigue_runner.errors import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from fatigue_runner.turbine import Turbine
+
+Say = Callable[[str], None]
+InitialState = Callable[[Any, str, Any], Any]  # `campaign.initial.initial_state`
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Range(_Part):
+    """`count` values from start to stop, both included."""
+
+    start: float = Field(gt=0)
+    stop: float = Field(gt=0)
+    count: int = Field(ge=1, le=1000)
+
+
+class Winds(_Part):
+    """What blows; see the module."""
+
+    type: Literal["constant", "turbulent"] = "turbulent"
+    speeds: Range | list[float]
+    intensity: tuple[float, float] = (0.08, 0.18)
+    shear_exponent: tuple[float, float] = (0.0, 0.3)
+    vertical_shear: list[float] = [0.0]
+    horizontal_shear: list[float] = [0.0]
+    seed: int = Field(default=0, ge=0)
+    duration: float = Field(default=120.0, gt=0, le=1e4)
+
+    @field_validator("intensity", "shear_exponent")
+    @classmethod
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not 0 <= value[0] <= value[1]:
+            raise ValueError(f"must be [low, high] with 0 <= low <= high, got {list(value)}")
+        return value
+
+    @property
+    def speed_list(self) -> list[float]:
+        if isinstance(self.speeds, Range):
+            return [float(v) for v in np.linspace(self.speeds.start, self.speeds.stop, self.speeds.count)]
+        return self.speeds
+
+    def build(self) -> list[Any]:
+        """The wind sources."""
+        from fatigue_runner.wind import ConstantWind, TurbulentWind
+
+        if self.type == "constant":
+            return [
+                ConstantWind(v, kv, kh)
+                for v in self.speed_list for kv in self.vertical_shear for kh in self.horizontal_shear
+            ]  # fmt: skip
+        rng = np.random.Generator(np.random.PCG64(self.seed))
+        return [
+            TurbulentWind(
+                v, intensity=float(rng.uniform(*self.intensity)), shear_exponent=float(rng.uniform(*self.shear_exponent)),
+                seed=100_000 + 1000 * self.seed + number, duration=self.duration,
+            )
+            for number, v in enumerate(self.speed_list)
+        ]  # fmt: skip
+
+
+class GuardRecipe(_Part):
+    """Acceptance test of the hybrid."""
+
+    norm: Literal["max", "rms"] = "max"
+    kappa: float = Field(default=2.0, ge=1)
+    quantile: float = Field(default=1.0, gt=0, le=1)
+    rtol: float = Field(default=0.0, ge=0)
+    substeps: int | None = Field(default=None, ge=0, le=64)
+
+
+class AffineRecipe(_Part):
+    """A whole recipe; see the module."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    family: Literal["affine"]
+    description: str = ""
+    turbine: str = "nrel5mw"
+    method: str
+    step: float = Field(gt=0, le=1)
+    factors: list[str] = []
+    history: int = Field(default=0, ge=0, le=features.MOST_HISTORY)
+    training: Winds
+    validation: Winds
+    initial: Literal["operating-point", "paper", "paper-spinning"] = "operating-point"
+    samples: int = Field(default=500, ge=10, le=100_000)
+    perturbation: float = Field(default=1e-5, ge=0, le=1)
+    ridge: float = Field(default=1e-12, gt=0, le=1)
+    seed: int = Field(default=0, ge=0)
+    guard: GuardRecipe = GuardRecipe()
+
+    @field_validator("factors")
+    @classmethod
+    def _factors_exist(cls, value: list[str]) -> list[str]:
+        for name in value:
+            if name not in features.FACTORS:
+                raise ValueError(f"unknown feature factor {name!r}{did_you_mean(name, features.FACTORS)}")
+        return value
+
+    @field_validator("method")
+    @classmethod
+    def _has_stages(cls, value: str) -> str:
+        try:
+            samples.tableau(value)
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        return value
+
+    @model_validator(mode="after")
+    def _validation_unseen(self) -> AffineRecipe:
+        if self.training == self.validation:
+            raise ValueError(
+                "validation must hold other winds than training; give it another seed or other speeds"
+            )
+        return self
+
+
+def parse_affine(data: Mapping[str, Any], place: str = "recipe") -> AffineRecipe:
+    """The recipe in a mapping. Raises InputError with the place, the key and the nearest known one of the first mistake."""
+    try:
+        return AffineRecipe.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        location = [str(part) for part in first["loc"] if part not in ("Range", "list[float]")]
+        key = ".".join(location)
+        if first["type"] == "extra_forbidden":
+            inner = {"training": Winds, "validation": Winds, "guard": GuardRecipe}
+            part: Any = inner.get(location[0], AffineRecipe) if len(location) > 1 else AffineRecipe
+            known = Range.model_fields if "speeds" in location[:-1] else part.model_fields
+            raise InputError(f"{place}: unknown key {key!r}{did_you_mean(location[-1], known)}") from None
+        what = first["msg"].removeprefix("Value error, ")
+        raise InputError(f"{place}: {key}: {what}" if key else f"{place}: {what}") from None
+
+
+def starts(turbine: Turbine, winds: list[Any], initial: str, initial_state: InitialState | None) -> Any:
+    if initial_state is None:
+        if initial != "operating-point":
+            raise InputError(f"initial {initial!r} needs the campaign's initial states")
+        return samples.operating_points(turbine, winds)
+    return np.array([initial_state(turbine, initial, wind) for wind in winds])
+
+
+def train_affine(
+    recipe: AffineRecipe,
+    turbine: Turbine,
+    initial_state: InitialState | None = None,
+    say: Say = lambda what: None,
+    text: str = "",
+) -> Corrector:
+    """The guarded corrector that a recipe makes; say: told of each stage; text: the recipe's file, kept in the artefact."""
+    begin = time.perf_counter()
+    winds = recipe.training.build()
+    say(f"reference trajectories under {len(winds)} winds")
+    common: dict[str, Any] = {"perturbation": recipe.perturbation, "history": recipe.history}
+    train = samples.collect(
+        turbine, recipe.method, recipe.step, winds, recipe.training.duration, recipe.samples, seed=recipe.seed,
+        initial=starts(turbine, winds, recipe.initial, initial_state), **common,
+    )  # fmt: skip
+    say(f"fitting {len(train.plain)} steps")
+    size = recipe.step ** (samples.tableau(recipe.method).order + 1)
+    x = train.features(features.STAGE_AWARE, tuple(recipe.factors))
+    weights = fit.affine(x, train.defect, recipe.ridge) / size
+    low, high = float(train.rows[:, 16].min()), float(train.rows[:, 16].max())
+    open_guard = Guard(0.0, recipe.guard.norm, 1.0, 1.0, (1.0,) * 16, (0.0,) * 16, 2 if recipe.history else 0)
+    corrector = Corrector(
+        name=recipe.name, family=recipe.family, method=recipe.method, step=recipe.step, turbine=turbine.name,
+        turbine_hash=turbine.hash, kind=features.STAGE_AWARE, factors=tuple(recipe.factors), linear=weights, layers=(),
+        activation="identity", guard=open_guard, wind_range=(low, high), recipe=text, history=recipe.history,
+    )  # fmt: skip
+    g = recipe.guard
+    say("acceptance threshold")
+    guard = from_training_set(corrector, turbine, train, g.norm, g.kappa, g.quantile, g.rtol, g.substeps)
+    corrector = replace(corrector, guard=guard)
+    say("validation")
+    judged = validate(corrector, recipe, turbine, initial_state)
+    made = {
+        "samples": len(train.plain),
+        "winds": len(winds),
+        "seed": recipe.seed,
+        "seconds": round(time.perf_counter() - begin, 1),
+    }
+    return replace(corrector, validation=judged, training=made)
+
+
+def validate(
+    corrector: Corrector, recipe: AffineRecipe, turbine: Turbine, initial_state: InitialState | None = None
+) -> dict[str, float]:
+    """Figures on the validation winds: NRMSE (largest over states; median and worst over winds), relative residual per state."""
+    from fatigue_runner.channels import STATE_NAMES
+
+    winds = recipe.validation.build()
+    start = starts(turbine, winds, recipe.initial, initial_state)
+    step = samples.output_step(recipe.step, 1)
+    duration = recipe.validation.duration - 2 * recipe.step
+    runs = samples.references(turbine, winds, start, duration, step)
+    unseen = samples.collect(
+        turbine,
+        recipe.method,
+        recipe.step,
+        winds,
+        duration,
+        200,
+        0.0,
+        recipe.seed + 1,
+        history=recipe.history,
+        runs=runs,
+    )
+    left = fit.relative_residual(corrector.predict(unseen), unseen.defect)
+    out = {f"residual_{name}": float(value) for name, value in zip(STATE_NAMES, left, strict=True)}
+    for mode in ("plain", "enhanced", "hybrid"):
+        errors, accepted = rollout_errors(
+            turbine, corrector, None if mode == "plain" else mode, winds, start, duration, runs
+        )
+        out |= {f"nrmse_{mode}": float(np.median(errors)), f"nrmse_{mode}_worst": float(errors.max())}
+        if mode == "hybrid":
+            out["acceptance"] = accepted
+    # a run that diverged has no error: left out, as JSON knows no infinity
+    return {name: value for name, value in out.items() if np.isfinite(value)}
+
+
+def rollout_errors(
+    turbine: Turbine,
+    corrector: Corrector,
+    mode: str | None,
+    winds: Any,
+    start: Any,
+    duration: float,
+    runs: Any,
+) -> tuple[Any, float]:
+    """(winds,) NRMSE, the largest over states, infinite where a run diverged; and the share of accepted steps. mode None: plain."""
+    from fatigue_runner.integrators import simulate_block
+
+    output = float(runs[0].time[1] - runs[0].time[0])
+    out = np.full(len(winds), np.inf)
+    accepted = []
+    for key in dict.fromkeys(w.cell_key for w in winds):
+        chosen = [i for i, w in enumerate(winds) if w.cell_key == key]
+        block = simulate_block(
+            turbine, corrector.method, corrector.step, [winds[i] for i in chosen], start[chosen], duration, output,
+            corrector=corrector if mode else None, mode=mode or "enhanced",
+        )  # fmt: skip
+        for i, run in zip(chosen, block, strict=True):
+            accepted.append(float(run.accepted.mean()) if len(run.accepted) else 1.0)
+            if run.diverged_at is None:
+                reference = runs[i].state[: len(run.state)]
+                scale = np.ptp(reference, axis=0)
+                scale[scale == 0] = 1.0
+                out[i] = float((np.sqrt(((run.state - reference) ** 2).mean(axis=0)) / scale).max())
+    return out, float(np.mean(accepted))
