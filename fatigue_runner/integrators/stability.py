@@ -56,14 +56,14 @@ def _tried_limit(turbine: Turbine, method: str, wind: float, pitch: float) -> fl
     # deflections and their velocities; the rotation itself is neutral
     start[1:, :6] += 1e-3 * rng.standard_normal((TRIED - 1, 6))
     found = 0.0
-    for h in np.geomspace(0.02, LARGEST, 80):
+    for h in np.geomspace(0.1, LARGEST, 24):
         runs = simulate_block(
-            turbine, method, float(h), [ConstantWind(wind)] * TRIED, start, 400 * float(h), pitch=pitch
+            turbine, method, float(h), [ConstantWind(wind)] * TRIED, start, 200 * float(h), pitch=pitch
         )
         if any(r.diverged_at is not None for r in runs):
             break
         off = np.array([r.state[:, 8:14] - runs[0].state[:, 8:14] for r in runs[1:]])
-        early, late = np.abs(off[:, 20:60]).max(), np.abs(off[:, -40:]).max()
+        early, late = np.abs(off[:, 10:50]).max(), np.abs(off[:, -40:]).max()
         if late > early:
             break
         found = float(h)
