@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from functools import cache
 
@@ -50,6 +51,6 @@ def network(raw: bool, activation="isru", seed=0) -> Corrector:
     rng = np.random.default_rng(seed)
     inputs = 18 if raw else len(features.names(features.STAGE_AWARE, 2))
     sizes = (inputs - 1, 13, 24, 16)
-    layers = tuple(rng.normal(size=(b, a + 1)) / (10 * a) for a, b in zip(sizes, sizes[1:], strict=False))
+    layers = tuple(rng.normal(size=(b, a + 1)) / (10 * a) for a, b in itertools.pairwise(sizes))
     kind = features.RAW if raw else features.STAGE_AWARE
     return replace(trained(), family="test", kind=kind, linear=None, layers=layers, activation=activation)

@@ -10,7 +10,7 @@ training      winds, see below; `validation`: other winds, for the figures of th
 samples       single steps per wind (default 500); half of them `perturbation` (1e-5 of each state's deviation) off the trajectory
 ridge         of the fit, relative to unit features (default 1e-12)
 seed          of the samples (default 0)
-guard         norm (`max`, `rms`), kappa (2), quantile (1: the largest), rtol (0), substeps (fallback; default as needed)
+guard         norm (`max`, `rms`), kappa (2), quantile (0.999; 1: the largest), rtol (0), substeps (fallback; default as needed)
 
 Winds: `type: constant` with `speeds`, `vertical_shear`, `horizontal_shear` (lists, every combination), or `type: turbulent` with
 `speeds: {start, stop, count}`, `intensity: [low, high]`, `shear_exponent: [low, high]`, `seed`: one wind per speed, the two drawn;
@@ -100,7 +100,7 @@ class GuardRecipe(_Part):
 
     norm: Literal["max", "rms"] = "max"
     kappa: float = Field(default=2.0, ge=1)
-    quantile: float = Field(default=1.0, gt=0, le=1)
+    quantile: float = Field(default=0.999, gt=0, le=1)
     rtol: float = Field(default=0.0, ge=0)
     substeps: int | None = Field(default=None, ge=0, le=64)
 
