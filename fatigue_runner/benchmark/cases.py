@@ -55,8 +55,10 @@ def load_cases(campaign: str | Path | Mapping[str, Any]) -> Cases:
     from fatigue_runner.campaign.source import read_source
     from fatigue_runner.campaign.spec import parse_campaign
 
-    listed = not isinstance(campaign, Mapping) or "integrators" in campaign
-    source = read_source(campaign if listed else {**_ANY, **dict(campaign)})
+    listed = True
+    if isinstance(campaign, Mapping):
+        listed, campaign = "integrators" in campaign, {**_ANY, **campaign}
+    source = read_source(campaign)
     spec = parse_campaign(source)
     turbine = checks.load_turbine(spec, source)
     checks.check_pitch(spec, turbine, source)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner.benchmark import adaptive, figures, machine, text, work_precision
+from fatigue_runner.benchmark import adaptive, figures, kernel, machine, network, text, work_precision
 from fatigue_runner.benchmark.cases import BUILT_IN, load_cases
 
 COMMAND = "fatigue-runner benchmark work-precision --out docs"
@@ -23,8 +23,15 @@ def measure(campaigns: Sequence[Path], repeats: int, say: Callable[[str], None])
         reference = work_precision.make_reference(cases, *work_precision.REFERENCE)
         part["adaptive"] = adaptive.measure(cases, reference)
         parts.append(part)
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
-    return {"machine": machine.describe(), "load_average": load, "repeats": repeats, "cases": parts}
+    say("kernel and network")
+    return {
+        "machine": machine.describe(),
+        "load_average": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "repeats": repeats,
+        "cases": parts,
+        "kernel": kernel.measure(max(3, repeats)),
+        "network": network.measure_with_one_thread(max(3, repeats)),
+    }
 
 
 def write(result: dict[str, Any], folder: Path, images: Path) -> Path:
@@ -37,7 +44,7 @@ def write(result: dict[str, Any], folder: Path, images: Path) -> Path:
         "",
         f"Made by `{COMMAND}`; every figure is from that one run. {text.machine(result['machine'])}. One pinned thread, CPU "
         f"time, medians of {result['repeats']} interleaved rounds with quartiles; load average at the end "
-        f"{result['load_average']:.1f}.",
+        f"{result['load_average'] or 0:.1f}.",
         "",
         "NRMSE: RMS error over the range of the state, RMS over the cases, of the worst state; `worst case`: of the worst "
         "state of the worst case. DEL error: the largest over channels, Wöhler exponents 3 to 12 and cases. µs/s: microseconds "
@@ -47,6 +54,9 @@ def write(result: dict[str, Any], folder: Path, images: Path) -> Path:
     ]
     for part in result["cases"]:
         lines += [*text.cases(part), ""]
+    if "kernel" in result:
+        lines += ["## Kernel", "", *text.kernel(result["kernel"]), ""]
+        lines += ["## The paper's network", "", *text.network(result["network"]), ""]
     lines += ["## Stability limits", "", *text.limits(result["cases"][0]), ""]
     lines += ["From the linearised turbine (`etdrk4`: tried out, up to 1 s).", "", "## Figures", ""]
     lines += [f"![{name.removesuffix('.png')}]({where}/{name})\n" for name in names]

@@ -1,7 +1,7 @@
 """Exponential Runge-Kutta methods: the turbine's linear part is integrated exactly, the stages see only the rest.
 
-x' = A x + g(t, x) with A the Jacobian of f about the operating point at `LINEARISED_AT`, averaged over the azimuth: one matrix per
-turbine and pitch, whatever the case's wind, so that a case's bits do not depend on its block and matrices are shared by lanes.
+x' = A x + g(t, x) with A the Jacobian of f about the operating point at `LINEARISED_AT`, averaged over the azimuth: one matrix
+per turbine and pitch whatever the case's wind, so that a case's bits do not depend on its block and lanes share the matrices.
 Any A keeps the order; a good one takes the stiff shaft and edge motion out of the error and of the stability limit.
 """
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ def _width(count: int) -> int:
     return -(-count // 4) * 4
 
 
-def _terms(weights: Sequence[float]) -> Terms:
+def _terms(weights: NDArray[np.float64]) -> Terms:
     """Stage 0 first, even with weight 0, since its row changes from step to step."""
     return [(0, float(weights[0]))] + [(RING - 1 + j, float(w)) for j, w in enumerate(weights) if j and w]
 

@@ -8,10 +8,12 @@ Krogstad's stages in terms of f and of differences, so that only displacements w
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fatigue_runner.compiled import FAST, njit
-from fatigue_runner.integrators.correction import dense
+from fatigue_runner.integrators import correction
 from fatigue_runner.integrators.stepping import (
     WIDTH,
     all_fine,
@@ -23,6 +25,7 @@ from fatigue_runner.integrators.stepping import (
 from fatigue_runner.turbine.generated import kernel
 
 _rhs = kernel.rhs
+dense: Any = correction.dense  # an intrinsic, whose first argument numba supplies
 BLOCKS = 2  # of eight outputs
 
 

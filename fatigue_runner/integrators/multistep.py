@@ -70,7 +70,7 @@ class LinearMultistep:
 
 
 def _weights(text: str, denominator: int) -> tuple[Number, ...]:
-    return tuple(Fraction(x, denominator) for x in F(text))
+    return tuple(Fraction(x) / denominator for x in F(text))
 
 
 _ADAMS = "Bashforth & Adams (1883); Hairer, Norsett & Wanner (2008), III.1, eqs. 1.5 and 1.9'"

@@ -32,7 +32,7 @@ class OutputPlan:
 
 @lru_cache(maxsize=4096)
 def hermite_weights(theta: float, nodes: tuple[float, ...]) -> tuple[Array, Array]:
-    """(3 nodes,) weights for the value and for the derivative at `theta` [steps], from value, slope and curvature at the nodes."""
+    """(3 nodes,) weights for value and derivative at `theta` [steps], from value, slope and curvature at the nodes."""
     size = 3 * len(nodes)
     rows = np.zeros((size, size))
     for i, x in enumerate(nodes):
@@ -43,7 +43,8 @@ def hermite_weights(theta: float, nodes: tuple[float, ...]) -> tuple[Array, Arra
     powers = np.arange(size)
     value = theta**powers
     slope = np.where(powers > 0, powers * theta ** np.maximum(powers - 1, 0), 0.0)
-    return np.linalg.solve(rows.T, value), np.linalg.solve(rows.T, slope)
+    both = np.linalg.solve(rows.T, np.stack([value, slope], axis=1)).astype(np.float64)
+    return both[:, 0].copy(), both[:, 1].copy()
 
 
 def plan_output(
@@ -51,9 +52,9 @@ def plan_output(
 ) -> OutputPlan:
     """Output at multiples of `output_step` [s] (None: at every step) for a run of `steps` steps."""
     if output_step is None:
-        time = np.arange(steps + 1) * step
+        time: Array = np.arange(steps + 1, dtype=np.float64) * step
     else:
-        time = np.arange(int(np.floor(duration / output_step + 1e-9)) + 1) * output_step
+        time = np.arange(int(np.floor(duration / output_step + 1e-9)) + 1, dtype=np.float64) * output_step
     place = time / step
     nearest = np.rint(place)
     exact = np.abs(place - nearest) < 1e-6

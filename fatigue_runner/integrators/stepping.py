@@ -1,8 +1,9 @@
 """Compiled pieces of a time step of one group of LANES cases in lockstep; `loops` puts them together.
 
-`FAST` lets LLVM assume that there is no NaN, so the divergence check compares bits, not numbers. Loops over the state have the constant length WIDTH and write to one array, so that they vectorise.
-Whole arrays and row numbers are passed, never rows: numba counts references of a row atomically, which cost as much as half an
-evaluation (measured); and functions have one exit, so that it can drop the counting of their arguments.
+`FAST` lets LLVM assume that there is no NaN, so the divergence check compares bits, not numbers. Loops over the state have the
+constant length WIDTH and write to one array, so that they vectorise. Whole arrays and row numbers are passed, never rows: numba
+counts references of a row atomically, which cost as much as half an evaluation (measured); and functions have one exit, so that
+it can drop the counting of their arguments.
 """
 
 from __future__ import annotations

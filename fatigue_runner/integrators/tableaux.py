@@ -43,9 +43,9 @@ class ButcherTableau:
                 )
         if len(self.A) != self.stages - 1:
             raise ValueError(f"{self.name}: {len(self.A)} rows of A for {self.stages} stages")
-        for label, weights in (("b", self.b), ("b_hat", self.b_hat)):
-            if weights is not None and abs(float(sum(weights)) - 1) > 1e-14:
-                raise ValueError(f"{self.name}: {label} adds up to {float(sum(weights))}, not 1")
+        for label, total in (("b", self.b), ("b_hat", self.b_hat)):
+            if total is not None and abs(float(sum(total)) - 1) > 1e-14:
+                raise ValueError(f"{self.name}: {label} adds up to {float(sum(total))}, not 1")
 
     @property
     def stages(self) -> int:
@@ -119,7 +119,8 @@ HEUN = tableau(
     "heun", 2, ["1"], "1/2 1/2", "Heun (1900); arXiv:2504.05493, example 1", b_hat="1 0", embedded_order=1
 )
 RK3 = tableau(
-    "rk3", 3, ["1", "1/4 1/4"], "1/6 1/6 2/3", "Shu & Osher (1988), doi:10.1016/0021-9991(88)90177-5; arXiv:2504.05493, example 3: shares Heun's two stages",
+    "rk3", 3, ["1", "1/4 1/4"], "1/6 1/6 2/3",
+    "Shu & Osher (1988), doi:10.1016/0021-9991(88)90177-5; arXiv:2504.05493, example 3: shares Heun's two stages",
     b_hat="1/2 1/2 0", embedded_order=2,
 )  # fmt: skip
 # Heun over the step and over its two halves, extrapolated to order 3; the first evaluation is shared.
@@ -148,10 +149,13 @@ DP5 = tableau(
 )  # fmt: skip
 RK7 = tableau(
     "rk7", 7,
-    ["2/27", "1/36 1/12", "1/24 0 1/8", "5/12 0 -25/16 25/16", "1/20 0 0 1/4 1/5", "-25/108 0 0 125/108 -65/27 125/54",
-     "31/300 0 0 0 61/225 -2/9 13/900", "2 0 0 -53/6 704/45 -107/9 67/90 3", "-91/108 0 0 23/108 -976/135 311/54 -19/60 17/6 -1/12",
+    ["2/27", "1/36 1/12", "1/24 0 1/8", "5/12 0 -25/16 25/16", "1/20 0 0 1/4 1/5",
+     "-25/108 0 0 125/108 -65/27 125/54",
+     "31/300 0 0 0 61/225 -2/9 13/900", "2 0 0 -53/6 704/45 -107/9 67/90 3",
+     "-91/108 0 0 23/108 -976/135 311/54 -19/60 17/6 -1/12",
      "2383/4100 0 0 -341/164 4496/1025 -301/82 2133/4100 45/82 45/164 18/41"],
-    "41/840 0 0 0 0 34/105 9/35 9/35 9/280 9/280 41/840", "Fehlberg (1968), NASA TR R-287, RK7(8): the 11 stages of its 7th-order result",
+    "41/840 0 0 0 0 34/105 9/35 9/35 9/280 9/280 41/840",
+    "Fehlberg (1968), NASA TR R-287, RK7(8): the 11 stages of its 7th-order result",
 )  # fmt: skip
 TSIT5 = ButcherTableau(
     "tsit5", 5,
@@ -161,7 +165,8 @@ TSIT5 = ButcherTableau(
      (0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081, 2.324710524099774)),
     (0.09646076681806523, 0.01, 0.4798896504144996, 1.379008574103742, -3.290069515436081, 2.324710524099774, 0.0),
     "Tsitouras (2011), doi:10.1016/j.camwa.2011.06.002",
-    b_hat=(0.09468075576583945, 0.009183565540343254, 0.4877705284247616, 1.234297566930479, -2.7077123499835256, 1.866628418170587, 1 / 66),
+    b_hat=(0.09468075576583945, 0.009183565540343254, 0.4877705284247616, 1.234297566930479, -2.7077123499835256,
+           1.866628418170587, 1 / 66),
     embedded_order=4,
 )  # fmt: skip
 
