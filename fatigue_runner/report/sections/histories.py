@@ -112,7 +112,7 @@ def _limits(values: np.ndarray) -> tuple[float, float]:
     A diverging curve may leave the axes, not flatten everything else; rounding must not fill them.
     """
     low, high = float(values.min()), float(values.max())
-    span = max(high - low, 0.05 * max(abs(low), abs(high)), 1e-6)
+    span = max(high - low, 2e-3 * max(abs(low), abs(high)), 1e-6)
     middle = 0.5 * (low + high)
     return middle - 0.58 * span, middle + 0.58 * span
 
