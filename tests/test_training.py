@@ -15,7 +15,6 @@ from fatigue_runner.corrector.training_data import (
     along_trajectories,
     apply,
     fold,
-    join,
     pairs,
 )
 from fatigue_runner.errors import InputError
@@ -231,4 +230,3 @@ def test_targets_are_the_defect_over_the_step_cubed_for_heun(turbine_samples):
     found = pairs(samples, "heun", 0.01)
     np.testing.assert_allclose(found.targets, (samples.exact - samples.plain) / 1e-6)
     np.testing.assert_array_equal(found.inputs, samples.raw[:, 1:])
-    assert len(join([samples, samples]).raw) == 2 * len(samples.raw)

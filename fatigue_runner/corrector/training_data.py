@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -46,11 +46,6 @@ def pairs(
     if linear is not None:
         target = target - seen @ linear.T
     return Pairs(seen[:, 1:], target)
-
-
-def join(parts: Sequence[Samples]) -> Samples:
-    """All samples of several sets, in order."""
-    return Samples(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Samples)))
 
 
 def along_trajectories(

@@ -46,12 +46,11 @@ class Perturbation(_Part):
 
 
 class GuardRecipe(_Part):
-    """Acceptance test of the hybrid; atol is `atol_share` of each state's range over the training set."""
+    """Acceptance test of the hybrid, see `guard.from_training_set`."""
 
-    norm: Literal["max", "rms"] = "max"
-    kappa: float = Field(default=1.2, ge=1)
+    norm: Literal["max", "rms"] = "rms"
+    kappa: float = Field(default=1.0, ge=1)
     quantile: float = Field(default=1.0, gt=0, le=1)
-    atol_share: float = Field(default=1e-3, gt=0)
     rtol: float = Field(default=0.0, ge=0)
 
 
@@ -85,7 +84,7 @@ class MlpRecipe(_Part):
     def settings(self) -> MlpSettings:
         from fatigue_runner.corrector.training import MlpSettings
 
-        values = {k: tuple(v) if isinstance(v, list) else v for k, v in self.training.items()}
+        values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in self.training.items()}
         return MlpSettings(**values)
 
 
@@ -126,17 +125,24 @@ def read_recipe(path: Path) -> MlpRecipe:
 
 def sample_sets(recipe: MlpRecipe, turbine: Turbine, initial_state: InitialState) -> tuple[Samples, Samples]:
     """Training and validation samples of a recipe; only the training ones are perturbed."""
-    from fatigue_runner.wind import ConstantWind
-
     found = []
     for speeds, more in ((recipe.speeds.train, recipe.perturbation.copies), (recipe.speeds.validation, 0)):
-        winds = [ConstantWind(speed) for speed in speeds]
-        start = np.array([initial_state(turbine, recipe.initial, wind) for wind in winds])
+        winds, start = _starts(recipe, turbine, initial_state, speeds)
         size = recipe.perturbation.size
         found.append(
             along_trajectories(turbine, recipe.method, recipe.step, winds, start, recipe.duration, more, size)
         )
     return found[0], found[1]
+
+
+def _starts(
+    recipe: MlpRecipe, turbine: Turbine, initial_state: InitialState, speeds: list[float]
+) -> tuple[list[Any], Array]:
+    """Winds and their initial states (n, 16)."""
+    from fatigue_runner.wind import ConstantWind
+
+    winds = [ConstantWind(speed) for speed in speeds]
+    return winds, np.array([initial_state(turbine, recipe.initial, wind) for wind in winds])
 
 
 def pair_sets(recipe: MlpRecipe, train: Samples, validation: Samples) -> tuple[Pairs, Pairs]:
@@ -164,7 +170,7 @@ def train_recipe(
         "initial": recipe.initial, "duration": recipe.duration,
         "train_speeds": list(recipe.speeds.train), "validation_speeds": list(recipe.speeds.validation),
     }  # fmt: skip
-    return guarded(recipe, turbine, layers, train, validation, made, text), history
+    return guarded(recipe, turbine, initial_state, layers, train, validation, made, text), history
 
 
 def tune_recipe(
@@ -186,48 +192,56 @@ def tune_recipe(
 def guarded(
     recipe: MlpRecipe,
     turbine: Turbine,
+    initial_state: InitialState,
     layers: tuple[Array, ...],
     train: Samples,
     validation: Samples,
     made: Mapping[str, Any],
     text: str = "",
 ) -> Corrector:
-    """Corrector of trained layers: acceptance threshold from the training set, relative residuals from the validation winds."""
-    from fatigue_runner.channels import STATE_NAMES
-    from fatigue_runner.corrector.fit import relative_residual
-
-    open_guard = Guard(
-        0.0, recipe.guard.norm, recipe.guard.kappa, recipe.guard.quantile, (1.0,) * 16, (0.0,) * 16
-    )
-    corrector = Corrector(
-        name=recipe.name, family=recipe.family, method=recipe.method, step=recipe.step,
-        turbine=turbine.name, turbine_hash=turbine.hash, kind=features.RAW, factors=(), linear=None, layers=layers,
-        activation=recipe.settings().activation, guard=open_guard,
-        wind_range=(min(recipe.speeds.train), max(recipe.speeds.train)), training=dict(made), recipe=text,
-    )  # fmt: skip
-    left = relative_residual(corrector.predict(validation), validation.defect)
-    judged = dict(zip(STATE_NAMES, left.tolist(), strict=True))
-    return replace(corrector, guard=_guard(recipe, turbine, corrector, train), validation=judged)
-
-
-def _guard(recipe: MlpRecipe, turbine: Turbine, corrector: Corrector, samples: Samples) -> Guard:
-    """Limit: kappa times the largest, or the quantile, of the training set's distances from the next order's method."""
-    from fatigue_runner.corrector.samples import single_steps
+    """Corrector of trained layers: threshold from the training set, figures from the validation winds."""
+    from fatigue_runner.corrector.guard import from_training_set
     from fatigue_runner.integrators.correcting import SHARING
 
     if recipe.method not in SHARING:
         raise InputError(
             f"{recipe.method} shares its stages with no method of the next order; networks are trained for heun"
         )
-    state = samples.raw[:, 1:17]
-    pieces = np.zeros((len(state), 4, 3))
-    pieces[:, 0, 0] = samples.raw[:, 17]
-    fallback = single_steps(turbine, SHARING[recipe.method], recipe.step, state, pieces).plain
-    atol = recipe.guard.atol_share * np.ptp(state, axis=0)
-    rtol = np.full(16, recipe.guard.rtol)
-    scale = atol + np.maximum(np.abs(state), np.abs(fallback)) * rtol
-    away = np.abs(samples.plain + corrector.predict(samples) - fallback) / scale
-    size = away.max(axis=1) if recipe.guard.norm == "max" else np.sqrt((away**2).mean(axis=1))
     g = recipe.guard
-    limit = g.kappa * float(np.quantile(size, g.quantile))
-    return Guard(limit, g.norm, g.kappa, g.quantile, tuple(atol.tolist()), tuple(rtol.tolist()))
+    open_guard = Guard(0.0, g.norm, g.kappa, g.quantile, (1.0,) * 16, (0.0,) * 16)
+    corrector = Corrector(
+        name=recipe.name, family=recipe.family, method=recipe.method, step=recipe.step,
+        turbine=turbine.name, turbine_hash=turbine.hash, kind=features.RAW, factors=(), linear=None, layers=layers,
+        activation=recipe.settings().activation, guard=open_guard,
+        wind_range=(min(recipe.speeds.train), max(recipe.speeds.train)), training=dict(made), recipe=text,
+    )  # fmt: skip
+    guard = from_training_set(corrector, turbine, train, g.norm, g.kappa, g.quantile, g.rtol, 0)
+    corrector = replace(corrector, guard=guard)
+    return replace(corrector, validation=_judged(recipe, turbine, initial_state, corrector, validation))
+
+
+def _judged(
+    recipe: MlpRecipe,
+    turbine: Turbine,
+    initial_state: InitialState,
+    corrector: Corrector,
+    validation: Samples,
+) -> dict[str, float]:
+    """Figures on the validation winds, named as `affine.validate` names them."""
+    from fatigue_runner.channels import STATE_NAMES
+    from fatigue_runner.corrector.affine import rollout_errors
+    from fatigue_runner.corrector.fit import relative_residual
+    from fatigue_runner.corrector.samples import references
+
+    winds, start = _starts(recipe, turbine, initial_state, recipe.speeds.validation)
+    runs = references(turbine, winds, start, recipe.duration, recipe.step)
+    out: dict[str, float] = {}
+    for mode in ("plain", "enhanced", "hybrid"):
+        errors, accepted = rollout_errors(
+            turbine, corrector, None if mode == "plain" else mode, winds, start, recipe.duration, runs
+        )
+        out |= {f"nrmse_{mode}": float(np.median(errors)), f"nrmse_{mode}_worst": float(errors.max())}
+    out["acceptance"] = accepted
+    left = relative_residual(corrector.predict(validation), validation.defect)
+    out |= {f"residual_{name}": float(value) for name, value in zip(STATE_NAMES, left, strict=True)}
+    return {name: value for name, value in out.items() if np.isfinite(value)}

@@ -1,0 +1,80 @@
+"""The paper's figures: drawn from measurements of every integrator on the same unseen winds."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fatigue_runner.benchmark import paper
+from fatigue_runner.benchmark.paper_figures import draw
+from fatigue_runner.corrector.artefact import Corrector, Guard
+from fatigue_runner.turbine import load_turbine
+
+CAMPAIGN = {
+    "name": "tiny",
+    "turbine": "t2b1i1cg",
+    "duration": 0.2,
+    "output_rate": 100,
+    "initial": "paper-spinning",
+    "wind": {"type": "constant", "speeds": [6.0, 8.0, 12.0]},
+}
+
+
+@pytest.fixture(scope="module")
+def measured():
+    turbine = load_turbine("t2b1i1cg")
+    guard = Guard(0.0, "max", 1.0, 1.0, (1e-6,) * 16, (0.0,) * 16)
+    # a network that gives nothing, and a guard that trusts nothing
+    idle = Corrector(
+        "idle", "mlp", "heun", 0.01, turbine.name, turbine.hash, "raw", (), None, (np.zeros((16, 18)),), "relu", guard
+    )  # fmt: skip
+    return paper.measure(CAMPAIGN, [idle, replace(idle, step=0.005)], paper.BOXED)
+
+
+def outcome(measured, label, step):
+    return next(o for o in measured["outcomes"] if (o.label, o.step) == (label, step))
+
+
+def test_every_integrator_meets_every_wind_at_every_step(measured):
+    found = {(o.label, o.step) for o in measured["outcomes"]}
+    assert found == {
+        (name, step)
+        for step in paper.BOXED
+        for name in (*paper.CLASSICAL, *(f"heun + network, {m}" for m in paper.MODES))
+    }
+    assert all(len(o.delta_e_range) == 3 for o in measured["outcomes"])
+
+
+def test_a_network_of_zeros_is_heun_and_its_hybrid_without_trust_is_rk3(measured):
+    for step in paper.BOXED:
+        enhanced, hybrid = (outcome(measured, f"heun + network, {m}", step) for m in paper.MODES)
+        np.testing.assert_allclose(
+            enhanced.delta_e_range, outcome(measured, "heun", step).delta_e_range, rtol=1e-6
+        )
+        np.testing.assert_allclose(
+            hybrid.delta_e_range, outcome(measured, "rk3", step).delta_e_range, rtol=1e-6
+        )
+        assert hybrid.accepted == [0.0] * 3
+        assert hybrid.evaluations == outcome(measured, "rk3", step).evaluations
+
+
+def test_evaluations_are_stages_over_the_step(measured):
+    assert outcome(measured, "heun", 0.01).evaluations == pytest.approx(200, rel=0.03)
+    assert outcome(measured, "heun-richardson", 0.005).evaluations == pytest.approx(1000, rel=0.03)
+
+
+def test_a_tables_rows_are_of_the_chosen_winds(measured):
+    row = paper.rows(measured, [False, False, True])[0]
+    value = measured["outcomes"][0].delta_e_range[2]
+    assert row["delta_e_range"] == {"low": value, "median": value, "high": value, "worst": value}
+
+
+def test_the_figures_are_drawn_and_the_measurements_are_plain_json(measured, tmp_path):
+    paths = draw(measured, measured, tmp_path)
+    assert [p.name for p in paths] == ["paper-work-precision.png", "paper-boxes.png"]
+    assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)
+    again = json.loads(json.dumps(paper.to_json(measured)))
+    assert again["outcomes"][0]["delta_e_range"] == measured["outcomes"][0].delta_e_range

@@ -1,0 +1,134 @@
+"""From a recipe to an artefact that runs: what the corrector carries, and what a wrong recipe is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fatigue_runner.errors import InputError
+
+pytest.importorskip("torch", reason="training needs the extra `train`")
+
+from fatigue_runner.campaign.initial import initial_state
+from fatigue_runner.corrector import artefact
+from fatigue_runner.corrector.training_recipe import parse_recipe, read_recipe, sample_sets, train_recipe
+from fatigue_runner.integrators import simulate_block
+from fatigue_runner.turbine import load_turbine
+from fatigue_runner.wind import ConstantWind
+
+CORRECTORS = Path(__file__).parents[1] / "correctors"
+TINY = {
+    "name": "tiny",
+    "method": "heun",
+    "step": 0.01,
+    "speeds": {"train": [6.0, 8.0], "validation": [7.0]},
+    "duration": 0.4,
+    "training": {"hidden": [10], "epochs": 30, "learning_rate": 1e-2, "batch": 16},
+}
+
+
+@pytest.fixture(scope="module")
+def turbine():
+    return load_turbine("t2b1i1cg")
+
+
+@pytest.fixture(scope="module")
+def trained(turbine):
+    return train_recipe(parse_recipe(TINY), turbine, initial_state, text="the recipe")
+
+
+def test_a_trained_corrector_carries_its_origin_and_survives_its_file(trained, turbine, tmp_path):
+    corrector, history = trained
+    artefact.save(corrector, tmp_path / "tiny.safetensors")
+    again = artefact.load(tmp_path / "tiny.safetensors")
+    assert (again.turbine_hash, again.method, again.step, again.wind_range) == (
+        turbine.hash,
+        "heun",
+        0.01,
+        (6.0, 8.0),
+    )
+    assert again.recipe == "the recipe"
+    assert again.training["validation_loss"] == history.best
+    assert all(np.array_equal(a, b) for a, b in zip(again.layers, corrector.layers, strict=True))
+    assert [layer.shape for layer in again.layers] == [(10, 18), (16, 11)]
+
+
+def test_the_kernel_applies_the_network_that_was_trained(trained, turbine):
+    corrector, _ = trained
+    samples, _ = sample_sets(parse_recipe(TINY), turbine, initial_state)
+    wind = ConstantWind(6.0)
+    start = initial_state(turbine, "paper-spinning", wind)
+    run = simulate_block(turbine, "heun", 0.01, [wind], start[None], 0.01, corrector=corrector)[0]
+    expected = samples.plain[0] + corrector.predict(samples)[0]
+    np.testing.assert_allclose(run.state[1], expected, rtol=1e-12, atol=1e-15)
+
+
+def test_the_hybrid_trusts_the_network_on_every_step_of_a_training_wind(trained, turbine):
+    corrector, _ = trained
+    samples, _ = sample_sets(parse_recipe(TINY), turbine, initial_state)
+    wind = ConstantWind(8.0)
+    start = samples.raw[40:41, 1:17]
+    run = simulate_block(turbine, "heun", 0.01, [wind], start, 0.1, corrector=corrector, mode="hybrid")[0]
+    assert run.accepted.all()
+    assert 0 < np.max(run.discrepancy) <= corrector.guard.limit
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"sped": 1}, "recipe: sped: .*did you mean"),
+        ({"speeds": {"train": []}}, "recipe: speeds"),
+        ({"training": {"batchsize": 3}}, "unknown setting 'batchsize'; did you mean 'batch'"),
+        ({"guard": {"kappa": 0.5}}, "recipe: guard.kappa"),
+        ({"step": -1}, "recipe: step"),
+    ],
+)
+def test_a_wrong_recipe_is_refused_with_the_key(change, message):
+    with pytest.raises(InputError, match=message):
+        parse_recipe({**TINY, **change})
+
+
+def test_a_file_that_is_no_recipe_is_refused(tmp_path):
+    for text in ("[1, 2]", "a: [", "\x00"):
+        (tmp_path / "recipe.yaml").write_text(text)
+        with pytest.raises(InputError, match=r"recipe\.yaml"):
+            read_recipe(tmp_path / "recipe.yaml")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_recipe(tmp_path / "absent.yaml")
+
+
+def test_a_method_without_a_cheap_fallback_is_refused(turbine):
+    recipe = parse_recipe({**TINY, "method": "rk4", "training": {"hidden": [4], "epochs": 1}})
+    with pytest.raises(InputError, match="rk4 shares its stages with no method"):
+        train_recipe(recipe, turbine, initial_state)
+
+
+PAPER = sorted(CORRECTORS.glob("paper-heun-*.yaml"))
+
+
+@pytest.mark.parametrize("path", PAPER, ids=lambda p: p.stem)
+def test_the_papers_recipes_keep_its_sizes_and_its_split(path):
+    recipe = read_recipe(path)
+    settings = recipe.settings()
+    assert (settings.hidden, settings.activation, settings.scheduler) == ((111, 111, 111), "relu", "plateau")
+    assert recipe.speeds.train == [6.1, 6.7, 7.8, 8.3, 8.8, 9.4] and recipe.speeds.validation == [5, 7.2]
+
+
+@pytest.mark.parametrize("path", PAPER, ids=lambda p: p.stem)
+def test_the_papers_networks_are_closer_than_rk3_on_winds_that_they_have_not_seen(path, turbine):
+    corrector = artefact.load(path.with_suffix(".safetensors"))
+    assert corrector.recipe == path.read_text(encoding="utf-8")
+    assert path.with_suffix(".safetensors").stat().st_size < 400_000
+    winds = [ConstantWind(v) for v in (6.45, 7.5, 9.1)]
+    start = np.array([initial_state(turbine, "paper-spinning", w) for w in winds])
+    step = corrector.step
+    exact = simulate_block(turbine, "dop853", 0.005, winds, start, 20.0, 0.1)
+
+    def errors(method, **more):
+        runs = simulate_block(turbine, method, step, winds, start, 20.0, 0.1, **more)
+        extent = np.ptp([e.state for e in exact], axis=(0, 1))
+        return [float(np.mean(((r.state - e.state) / extent) ** 2)) for r, e in zip(runs, exact, strict=True)]
+
+    assert all(np.array(errors("heun", corrector=corrector)) < np.array(errors("rk3")))
