@@ -23,6 +23,7 @@ __all__ = [
     "SeriesWind",
     "StepWind",
     "TurbulentWind",
+    "correctors",
     "damage_equivalent_load",
     "load_turbine",
     "rainflow",
@@ -40,13 +41,16 @@ def simulate(
     initial: str | Any = "operating-point",
     output_step: float | None = None,
     pitch: float = 0.0,
+    corrector: Any = None,
+    mode: str = "enhanced",
 ) -> Trajectory:
     """Simulate one case and return its trajectory.
 
     turbine: of `load_turbine`, or a name for it; wind: a wind source, or a constant speed [m/s]; step,
     duration [s]; initial: "operating-point", "paper", "paper-spinning" or a state (16,); output_step [s]:
     None samples every step, else the solution is interpolated; pitch [rad]. A case that diverges ends early:
-    see `diverged_at`. Raises InputError for an unknown method or turbine, a step that is not positive and a
+    see `diverged_at`. corrector: a name of `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid",
+    which guards it. Raises InputError for an unknown method or turbine, a step that is not positive and a
     malformed state.
     """
     from fatigue_runner.integrators import METHODS, simulate_block
@@ -61,9 +65,29 @@ def simulate(
         if value is not None and not value > 0:
             raise InputError(f"{name} must be above 0 s, got {value!r}")
     start = _state(turbine, initial, wind, pitch)
-    return simulate_block(turbine, method, step, [wind], start[None, :], duration, output_step, pitch=pitch)[
-        0
-    ]
+    if corrector is not None:
+        from fatigue_runner.corrector import find
+
+        corrector = find(corrector)
+    return simulate_block(
+        turbine,
+        method,
+        step,
+        [wind],
+        start[None, :],
+        duration,
+        output_step,
+        pitch=pitch,
+        corrector=corrector,
+        mode=mode,
+    )[0]
+
+
+def correctors() -> list[Any]:
+    """The shipped correctors: .name, .turbine, .turbine_hash, .method, .step [s], .validation, ..."""
+    from fatigue_runner.corrector import correctors as shipped
+
+    return shipped()
 
 
 def _state(turbine: Any, initial: Any, wind: WindSource, pitch: float) -> np.ndarray:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # Command groups of other rooms, loaded when they are called: (module, its Typer app).
 MOUNTED = {
+    "correctors": ("fatigue_runner.corrector.commands", "app"),
     "logs": ("fatigue_runner.logbook.commands", "app"),
     "view": ("fatigue_runner.viewer.commands", "app"),
 }
@@ -164,7 +165,9 @@ def turbine(
     pitch: Annotated[float, typer.Option("--pitch", help="Blade pitch [deg], positive to feather.")] = 0.0,
     write_tables: Annotated[
         bool,
-        typer.Option("--write-tables", help="First make the aerodynamic tables that the turbine file names (8 s)."),
+        typer.Option(
+            "--write-tables", help="First make the aerodynamic tables that the turbine file names (8 s)."
+        ),
     ] = False,
 ) -> None:
     """Show a turbine: masses, power coefficient, operating points, natural frequencies, stability limits.
@@ -184,6 +187,34 @@ def turbine(
     from fatigue_runner.cli_tables import print_turbine
 
     print_turbine(name, wind or [6.0, 8.0, 10.0], pitch, _console())
+
+
+@app.command()
+def train(
+    recipe: Annotated[
+        Path, typer.Argument(metavar="RECIPE", help="The recipe's YAML file.", show_default=False)
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder of the result; default: the recipe's.")
+    ] = None,
+    step: Annotated[float | None, typer.Option("--step", help="Another step [s] than the recipe's.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Another seed than the recipe's.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Another name than the recipe's.")] = None,
+) -> None:
+    """Train a corrector: NAME.safetensors and its card NAME.md beside the recipe.
+
+    Affine ones take seconds. A network's training can be stopped with Ctrl-C: the same command goes on.
+
+    Examples:
+
+        fatigue-runner train correctors/rk4-100ms.yaml
+
+        fatigue-runner train correctors/rk4-100ms.yaml --step 0.08 --name rk4-80ms --out runs
+    """
+    from fatigue_runner.campaign.initial import initial_state
+    from fatigue_runner.cli_tables import train_with_progress
+
+    train_with_progress(recipe, out, initial_state, {"step": step, "seed": seed, "name": name}, _console())
 
 
 def _console() -> Console:

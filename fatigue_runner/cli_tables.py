@@ -214,3 +214,24 @@ def _stability(turbine: Any) -> Table:
         table.add_row(method, f"{1e3 * stability_limit(turbine, method):.3g}")
     table.caption = "linearised at 8 m/s"
     return table
+
+
+def train_with_progress(
+    recipe: Any, out: Any, initial_state: Any, overrides: dict[str, Any], console: Console
+) -> None:
+    """Train a recipe with a line of progress; a network's training can be stopped and goes on from its checkpoint."""
+    from fatigue_runner.corrector.card import validation_rows
+    from fatigue_runner.corrector.recipes import train_file
+
+    with console.status("reading the recipe") as status:
+
+        def epoch(at: dict[str, float]) -> None:
+            status.update(
+                f"epoch {at['epoch']:.0f}/{at['epochs']:.0f}: validation {at['validation']:.3e}, best {at['best']:.3e} (Ctrl-C ends)"
+            )
+
+        checkpoint = (out or recipe.parent) / f".{overrides.get('name') or recipe.stem}.checkpoint"
+        made = train_file(recipe, out, initial_state, overrides, status.update, epoch, checkpoint)
+    for label, value in validation_rows(made.corrector)[:7]:
+        console.print(f"{label}: {value}")
+    console.print(f"corrector: {made.path}\ncard: {made.card}")

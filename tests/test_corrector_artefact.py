@@ -19,9 +19,13 @@ def written(tmp_path, corrector=None):
     return path
 
 
-@pytest.mark.parametrize("corrector", [trained(), trained(factors=("sin_azimuth",)), trained("rk4", 0.1, history=1), network(True)])
+@pytest.mark.parametrize(
+    "corrector", [trained(), trained(factors=("sin_azimuth",)), trained("rk4", 0.1, history=1), network(True)]
+)
 def test_a_file_gives_back_the_corrector_bit_by_bit(tmp_path, corrector):
-    corrector = replace(corrector, validation={"nrmse": 1e-5}, training={"seed": 3, "samples": 10}, recipe="name: x\n")
+    corrector = replace(
+        corrector, validation={"nrmse": 1e-5}, training={"seed": 3, "samples": 10}, recipe="name: x\n"
+    )
     back = load(written(tmp_path, corrector))
     for field in corrector.__dataclass_fields__:
         a, b = getattr(corrector, field), getattr(back, field)
@@ -76,7 +80,10 @@ def rewritten(path, change):
         (lambda h, t: t["linear"].__setitem__((3, 4), np.nan), "a weight is not a finite number"),
         (lambda h, t: t["linear"].__setitem__((3, 4), np.inf), "a weight is not a finite number"),
         (lambda h, t: t.update(linear=t["linear"][:, :-1].copy()), "do not fit heun's features"),
-        (lambda h, t: h.update(factors=["sin_azimut"]), "unknown feature factor 'sin_azimut'; did you mean 'sin_azimuth'"),
+        (
+            lambda h, t: h.update(factors=["sin_azimut"]),
+            "unknown feature factor 'sin_azimut'; did you mean 'sin_azimuth'",
+        ),
         (lambda h, t: h.update(kind="rawer"), "do not exist"),
         (lambda h, t: h["guard"].update(atol=[0.0] * 16), "16 positive numbers"),
         (lambda h, t: h["guard"].update(norm="euclid"), "norm must be one of max, rms"),

@@ -77,5 +77,7 @@ def load_cases(campaign: str | Path | Mapping[str, Any]) -> Cases:
         list(spec.fatigue.channels),
         list(spec.fatigue.wohler_exponents),
         spec.fatigue.residue,
-        [(i.method, i.step) for i in integrations(spec) if not i.is_reference] if listed else [],
+        [(i.method, i.step) for i in integrations(spec, source) if not (i.is_reference or i.corrector)]
+        if listed
+        else [],
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -143,7 +144,19 @@ def simulate(
         campaign.duration,
         1.0 / campaign.output_rate,
         pitch=float(np.deg2rad(campaign.pitch)),
+        corrector=_corrector(integration.file, integration.digest) if integration.file else None,
+        mode=integration.mode or "enhanced",
     )
+
+
+@functools.lru_cache(maxsize=16)
+def _corrector(file: str, digest: str) -> Any:
+    """The corrector, read once per worker; refused where its file is not the one that the cases were made for."""
+    from fatigue_runner.corrector import load
+
+    if hashlib.sha256(Path(file).read_bytes()).hexdigest() != digest:
+        raise FatigueRunnerError(f"corrector {file} changed while the campaign ran; run it again")
+    return load(file)
 
 
 @functools.lru_cache(maxsize=4)

@@ -13,12 +13,20 @@ from pathlib import Path
 from typing import Any
 
 from fatigue_runner.campaign.source import Source
-from fatigue_runner.campaign.spec import Campaign, Wind
+from fatigue_runner.campaign.spec import Campaign, Integrator, Wind
 from fatigue_runner.campaign.sweep import expand
 from fatigue_runner.errors import InputError
 
 # The code that decides the figures of a case.
-NUMERICAL_CODE = ("turbine", "wind", "integrators", "fatigue", "accuracy.py", "campaign/evaluate.py")
+NUMERICAL_CODE = (
+    "turbine",
+    "wind",
+    "integrators",
+    "corrector/artefact.py",
+    "fatigue",
+    "accuracy.py",
+    "campaign/evaluate.py",
+)
 
 
 @dataclass(frozen=True)
@@ -48,11 +56,15 @@ class Integration:
     step: float
     is_reference: bool = False
     path: tuple[str | int, ...] = ()
+    corrector: str = ""  # its name
+    mode: str = ""
+    file: str = ""  # of the corrector
+    digest: str = ""  # of that file
 
     @property
     def id(self) -> str:
-        """`heun_10ms`, `rk7_0.1ms`."""
-        return f"{self.method}_{self.step * 1e3:.9g}ms"
+        """`heun_10ms`, `rk7_0.1ms`, `heun_10ms_hybrid_heun-10ms`."""
+        return _join(f"{self.method}_{self.step * 1e3:.9g}ms", self.mode, self.corrector)
 
 
 @dataclass(frozen=True)
@@ -146,31 +158,53 @@ def resolve(source: Source, name: str) -> Path:
     return path if path.is_absolute() else source.folder / path
 
 
-def integrations(campaign: Campaign) -> list[Integration]:
-    """The reference first, then every integrator at each of its steps."""
+def integrations(campaign: Campaign, source: Source) -> list[Integration]:
+    """The reference first, then every integrator at each of its steps.
+
+    Raises InputError, with the line, for a corrector that is not found or cannot be read.
+    """
     reference = campaign.reference
     first = [Integration(reference.method, reference.step, True, ("reference",))] if reference else []
     return first + [
-        Integration(integrator.method, step, False, ("integrators", index))
+        Integration(
+            integrator.method, step, False, ("integrators", index), *_corrector(integrator, source, index)
+        )
         for index, integrator in enumerate(campaign.integrators)
         for step, _ in expand(integrator.step)
     ]
 
 
-def make_cases(campaign: Campaign, winds: Sequence[WindCase], turbine_hash: str) -> list[Case]:
+def _corrector(integrator: Integrator, source: Source, index: int) -> tuple[str, str, str, str]:
+    """(name, mode, file, digest), empty where there is none."""
+    if integrator.corrector is None:
+        return "", "", "", ""
+    from fatigue_runner.corrector import library, load
+
+    try:
+        path = library.locate(integrator.corrector, [source.folder])
+        name = load(path).name
+    except InputError as error:
+        raise InputError(f"{source.where(('integrators', index, 'corrector'))}: {error}") from None
+    return name, integrator.mode, str(path.resolve()), hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def make_cases(
+    campaign: Campaign, winds: Sequence[WindCase], turbine_hash: str, source: Source
+) -> list[Case]:
     """All cases of a campaign, wind by wind, the reference of a wind first."""
     common = campaign.model_dump(include={"duration", "output_rate", "initial", "pitch"})
     evaluation = campaign.model_dump(include={"fatigue", "discard"}) | {"log": campaign.log.model_dump()}
     cases = []
+    found = integrations(campaign, source)
     for wind in winds:
         reference_hash = ""
-        for integration in integrations(campaign):
+        for integration in found:
             simulation = {
                 "code": code_hash(),
                 "turbine": turbine_hash,
                 # A file's content counts, not where it lies.
                 "wind": [wind.kind, [pair for pair in wind.parameters if pair[0] != "file"]],
-                "integration": [integration.method, integration.step],
+                "integration": [integration.method, integration.step, integration.mode, integration.digest],
                 **common,
             }
             simulation_hash = _digest(simulation)

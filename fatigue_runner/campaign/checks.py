@@ -46,16 +46,29 @@ def check_integrators(campaign: Campaign, turbine: Any, source: Source) -> None:
     """Raise InputError for an unknown method and for a step above its stability limit on this turbine."""
     from fatigue_runner import integrators
 
-    for integration in integrations(campaign):
+    for integration in integrations(campaign, source):
         if integration.method not in integrators.METHODS:
             where = source.where((*integration.path, "method"))
             hint = did_you_mean(integration.method, integrators.METHODS)
             raise InputError(f"{where}: unknown integrator {integration.method!r}{hint}")
+        if integration.corrector:
+            # it may hold a step that the method alone does not; its own binding says what it fits
+            _check_corrector(integration, turbine, source)
+            continue
         limit = integrators.stability_limit(turbine, integration.method)
         if integration.step > limit:
             raise InputError(
                 f"{source.where((*integration.path, 'step'))}: {_unstable(integration, limit, turbine)}"
             )
+
+
+def _check_corrector(integration: Integration, turbine: Any, source: Source) -> None:
+    from fatigue_runner.corrector import load
+
+    try:
+        load(integration.file).bind(turbine, integration.method, integration.step)
+    except InputError as error:
+        raise InputError(f"{source.where((*integration.path, 'corrector'))}: {error}") from None
 
 
 def _unstable(integration: Integration, limit: float, turbine: Any) -> str:

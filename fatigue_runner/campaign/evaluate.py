@@ -17,7 +17,7 @@ from fatigue_runner.trajectory import Trajectory
 # The columns that say what was simulated; a log carries them too.
 DESCRIPTION = (
     *("wind_source", "wind_speed", "vertical_shear", "horizontal_shear", "turbulence_intensity", "seed"),
-    *("pitch_deg", "method", "step", "is_reference"),
+    *("pitch_deg", "method", "step", "corrector", "mode", "is_reference"),
 )
 
 
@@ -117,6 +117,8 @@ def empty_row(case: Case, campaign: Campaign) -> dict[str, Any]:
         "case_id": case.id,
         "method": case.integration.method,
         "step": case.integration.step,
+        "corrector": case.integration.corrector or None,
+        "mode": case.integration.mode or None,
         "is_reference": case.integration.is_reference,
     }
 

@@ -86,7 +86,7 @@ def make_plan(
     built = checks.build_winds(winds, spec, source)
     keys = {case.id: wind.cell_key for case, wind in zip(winds, built, strict=True)}
     initial = checks.initial_states(winds, built, spec, turbine, source)
-    return Plan(spec, source, turbine, make_cases(spec, winds, turbine.hash), keys, initial)
+    return Plan(spec, source, turbine, make_cases(spec, winds, turbine.hash, source), keys, initial)
 
 
 def resolved_yaml(plan: Plan) -> str:
@@ -99,7 +99,7 @@ def resolved_yaml(plan: Plan) -> str:
     if "files" in wind:
         wind["files"] = [str(checks.resolve(plan.source, name)) for name in wind["files"]]
     data["wind"] = _without_none({"type": plan.campaign.wind.type, **wind})
-    data["integrators"] = [_without_none(item.model_dump()) for item in plan.campaign.integrators]
+    data["integrators"] = [_resolved_integrator(item, plan) for item in plan.campaign.integrators]
     data["reference"] = None if plan.campaign.reference is None else plan.campaign.reference.model_dump()
     text = io.StringIO()
     text.write("# The campaign of this run folder, with every default written out.\n")
@@ -108,6 +108,14 @@ def resolved_yaml(plan: Plan) -> str:
     yaml.default_flow_style = None
     yaml.dump(data, text)
     return text.getvalue()
+
+
+def _resolved_integrator(item: Any, plan: Plan) -> dict[str, Any]:
+    if item.corrector is None:
+        return dict(_without_none(item.model_dump(exclude={"mode"})))
+    files = {case.integration.path[-1]: case.integration.file for case in plan.cases if case.integration.file}
+    index = plan.campaign.integrators.index(item)
+    return {**_without_none(item.model_dump()), "corrector": files[index]}
 
 
 def _without_none(value: Any) -> Any:

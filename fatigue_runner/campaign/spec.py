@@ -19,7 +19,9 @@ wind.turbulence_class  turbulent: `A`, `B` or `C`, the IEC normal turbulence mod
 wind.seeds             turbulent: how many seeds per speed (default 1; no two speeds share one), or a list
 wind.files             file: one path or a list, relative to the campaign file
 
-integrators     list of {method, step}: `step` [s] is a sweep, and every method meets every wind
+integrators     list of {method, step}: `step` [s] is a sweep, and every method meets every wind; with `corrector`, a name of
+                `fatigue-runner correctors list` or a file's path, its local error is corrected; `mode`: `hybrid` (default),
+                which guards the corrector, or `enhanced`
 reference       {method, step}: what the integrators are measured against (default rk7 at 0.001 s); or null
 
 fatigue.channels          load channels that are counted (default: blade 1 root and tower base, two each)
@@ -159,6 +161,14 @@ class Integrator(Section):
 
     method: str
     step: Annotated[Sweep, AfterValidator(_positive_steps)]
+    corrector: str | None = None
+    mode: Literal["hybrid", "enhanced"] = "hybrid"
+
+    @model_validator(mode="after")
+    def _mode_of_something(self) -> Integrator:
+        if self.corrector is None and "mode" in self.model_fields_set:
+            raise problem("means nothing without `corrector`; add one or remove it", key="mode")
+        return self
 
 
 class Reference(Section):
@@ -244,12 +254,16 @@ class Campaign(Section):
 
     @model_validator(mode="after")
     def _no_integrator_twice(self) -> Campaign:
-        seen = {(self.reference.method, self.reference.step): "the reference"} if self.reference else {}
+        seen: dict[Any, str] = {}
+        if self.reference:
+            seen[self.reference.method, self.reference.step, None, ""] = "the reference"
         for index, integrator in enumerate(self.integrators):
             for step, _ in expand(integrator.step):
                 if step > self.duration:
                     raise problem(f"step {step:g} s of {integrator.method} is longer than the whole case")
-                first = seen.setdefault((integrator.method, step), f"integrators[{index}]")
+                mode = integrator.mode if integrator.corrector else ""
+                key = integrator.method, step, integrator.corrector, mode
+                first = seen.setdefault(key, f"integrators[{index}]")
                 if first != f"integrators[{index}]":
                     raise problem(
                         f"{integrator.method} at {step * 1e3:g} ms is integrators[{index}] and also {first}; "

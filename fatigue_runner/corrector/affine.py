@@ -61,7 +61,7 @@ class Winds(_Part):
     vertical_shear: list[float] = [0.0]
     horizontal_shear: list[float] = [0.0]
     seed: int = Field(default=0, ge=0)
-    duration: float = Field(default=120.0, gt=0, le=1e4)
+    duration: float = Field(default=120.0, ge=2, le=1e4)
 
     @field_validator("intensity", "shear_exponent")
     @classmethod

@@ -245,9 +245,8 @@ def load(path: Path | str) -> Corrector:
     try:
         header = json.loads(metadata["header"])
         count = header.pop("layers")
-        header["guard"] = Guard(
-            **{k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()}
-        )
+        guard: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()}
+        header["guard"] = Guard(**guard)
         header["wind_range"], header["factors"] = tuple(header["wind_range"]), tuple(header["factors"])
         layers = tuple(tensors[f"layer{i}"].astype(float) for i in range(count))
         linear = tensors.get("linear")

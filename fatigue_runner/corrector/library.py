@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,8 +14,9 @@ PACKAGE = Path(__file__).parents[1]
 
 
 def shipped_folders() -> list[Path]:
-    """`correctors/` beside the package in a source tree, `fatigue_runner/correctors/` in an installed one (pyproject.toml)."""
-    return [folder for folder in (PACKAGE.parent / "correctors", PACKAGE / "correctors") if folder.is_dir()]
+    """`correctors/` beside the package in a source tree, `share/` of the environment where a wheel was installed (pyproject.toml)."""
+    installed = Path(sys.prefix) / "share" / "fatigue-runner" / "correctors"
+    return [folder for folder in (PACKAGE.parent / "correctors", installed) if folder.is_dir()]
 
 
 def files(more: Sequence[Path] = ()) -> dict[str, Path]:
@@ -39,14 +41,20 @@ def correctors(more: Sequence[Path] = ()) -> list[Corrector]:
 
 def find(name: str | Path | Corrector, more: Sequence[Path] = ()) -> Corrector:
     """A corrector by name, by path, or as it is. Raises CorrectorError with the nearest name for an unknown one."""
-    if isinstance(name, Corrector):
-        return name
+    return name if isinstance(name, Corrector) else load(locate(name, more))
+
+
+def locate(name: str | Path, more: Sequence[Path] = ()) -> Path:
+    """The file of a corrector by name or path; relative paths start at the folders `more` too.
+
+    Raises CorrectorError with the nearest name for an unknown one.
+    """
     text = str(name)
     if text.endswith(SUFFIX) or "/" in text or "\\" in text:
-        for folder in (Path(), *more):
+        for folder in (*more, Path()):
             if (folder / text).is_file():
-                return load(folder / text)
-        return load(Path(text))
+                return folder / text
+        raise CorrectorError(f"there is no corrector file {text}")
     known = files(more)
     if text not in known:
         hint = (
@@ -55,4 +63,4 @@ def find(name: str | Path | Corrector, more: Sequence[Path] = ()) -> Corrector:
             else "; there are none, train one with `fatigue-runner train RECIPE`"
         )
         raise CorrectorError(f"there is no corrector {text!r}{hint}")
-    return load(known[text])
+    return known[text]

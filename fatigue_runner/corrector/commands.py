@@ -1,0 +1,70 @@
+"""`fatigue-runner correctors list | show`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(no_args_is_help=True, help="Trained correctors: what is there, and how good it is.")
+
+Folder = Annotated[
+    Path | None, typer.Option("--folder", "-f", help="Also look in this folder, before the shipped ones.")
+]
+
+
+@app.command("list")
+def list_correctors(folder: Folder = None) -> None:
+    """One line per corrector: name, turbine, method and step, error on unseen winds.
+
+    Example:
+
+        fatigue-runner correctors list
+    """
+    from rich.console import Console
+    from rich.table import Table
+
+    from fatigue_runner.corrector import library
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for column in ("name", "family", "turbine", "method", "step [ms]", "plain", "enhanced", "hybrid"):
+        table.add_column(
+            column, justify="right" if column in ("step [ms]", "plain", "enhanced", "hybrid") else "left"
+        )
+    found = library.correctors([folder] if folder else [])
+    for c in found:
+        errors = [
+            f"{c.validation[key]:.1e}" if key in c.validation else "-"
+            for key in ("nrmse_plain", "nrmse_enhanced", "nrmse_hybrid")
+        ]
+        table.add_row(c.name, c.family, c.turbine, c.method, f"{c.step * 1e3:g}", *errors)
+    console = Console(highlight=False)
+    console = console if console.is_terminal else Console(highlight=False, width=120)
+    if not found:
+        typer.echo("no correctors found; train one with `fatigue-runner train RECIPE`")
+        return
+    console.print(table)
+    console.print(
+        "plain, enhanced, hybrid: median NRMSE over winds that were not trained on; - : diverged or not measured"
+    )
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(help="A corrector's name, or the path of its file.")],
+    folder: Folder = None,
+) -> None:
+    """A corrector's card: what it fits, how it was made, its figures, and the recipe.
+
+    Example:
+
+        fatigue-runner correctors show rk4-100ms
+    """
+    from fatigue_runner.corrector import library
+    from fatigue_runner.corrector.card import card
+
+    corrector = library.find(name, [folder] if folder else [])
+    typer.echo(card(corrector))
+    if corrector.recipe:
+        typer.echo("Recipe:\n\n" + corrector.recipe)
