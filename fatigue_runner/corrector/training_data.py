@@ -55,20 +55,23 @@ def along_trajectories(
     winds: Sequence[Any],
     initial: Array,
     duration: float,
+    sampling: float | None = None,
     perturbed: int = 0,
     perturbation: float = 0.01,
     seed: int = 0,
 ) -> Samples:
-    """Single steps of `method` from every step's state of the accurate trajectories, as arXiv 2504.05493 samples them.
+    """Single steps of `method` from states along accurate trajectories, as arXiv 2504.05493 samples them.
 
-    initial (n, 16), one per wind; step, duration [s]. `perturbed`: how many more copies of them are moved off the
-    trajectories, by a normal deviation of `perturbation` times each state's own over the set; the azimuths stay, the
-    shaft's twist and its rate move as little as they do in operation. Raises InputError where an accurate trajectory diverges.
+    initial (n, 16), one per wind; step, duration [s]; sampling: time between the states [s], a step by default.
+    `perturbed`: how many more copies of them are moved off the trajectories, by a normal deviation of `perturbation` times
+    each state's own over the set; the azimuths stay, the shaft's twist and its rate move as little as they do in operation.
+    Raises InputError where an accurate trajectory diverges.
     """
     from fatigue_runner.corrector.samples import _move
     from fatigue_runner.integrators import simulate_block
 
-    runs = simulate_block(turbine, ACCURATE, step, winds, initial, duration, step)
+    sampling = sampling or step
+    runs = simulate_block(turbine, ACCURATE, sampling, winds, initial, duration, sampling)
     for wind, run in zip(winds, runs, strict=True):
         if run.diverged_at is not None:
             raise InputError(

@@ -66,6 +66,9 @@ class MlpRecipe(_Part):
     speeds: Speeds
     initial: Literal["operating-point", "paper", "paper-spinning"] = "paper-spinning"
     duration: float = Field(default=20.0, gt=0)
+    sampling: float | None = Field(
+        default=None, gt=0
+    )  # s, of the training set; every step where it is not given
     perturbation: Perturbation = Perturbation()
     training: dict[str, Any] = {}
     guard: GuardRecipe = GuardRecipe()
@@ -126,11 +129,16 @@ def read_recipe(path: Path) -> MlpRecipe:
 def sample_sets(recipe: MlpRecipe, turbine: Turbine, initial_state: InitialState) -> tuple[Samples, Samples]:
     """Training and validation samples of a recipe; only the training ones are perturbed."""
     found = []
-    for speeds, more in ((recipe.speeds.train, recipe.perturbation.copies), (recipe.speeds.validation, 0)):
+    for speeds, sampling, more in (
+        (recipe.speeds.train, recipe.sampling, recipe.perturbation.copies),
+        (recipe.speeds.validation, None, 0),
+    ):
         winds, start = _starts(recipe, turbine, initial_state, speeds)
         size = recipe.perturbation.size
         found.append(
-            along_trajectories(turbine, recipe.method, recipe.step, winds, start, recipe.duration, more, size)
+            along_trajectories(
+                turbine, recipe.method, recipe.step, winds, start, recipe.duration, sampling, more, size
+            )
         )
     return found[0], found[1]
 
