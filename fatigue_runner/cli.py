@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 # Command groups of other rooms, loaded when they are called: (module, its Typer app).
 MOUNTED = {
+    "benchmark": ("fatigue_runner.benchmark.commands", "app"),
     "correctors": ("fatigue_runner.corrector.commands", "app"),
     "logs": ("fatigue_runner.logbook.commands", "app"),
     "view": ("fatigue_runner.viewer.commands", "app"),
