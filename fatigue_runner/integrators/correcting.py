@@ -39,7 +39,9 @@ class Correcting:
 
         history, own = self.network[2], len(self.method[2])
         start = min(steps, history)
-        return start * (STARTING * own - 1) + (self.fallback_evaluations * (steps - start) if self.hybrid else 0)
+        return start * (STARTING * own - 1) + (
+            self.fallback_evaluations * (steps - start) if self.hybrid else 0
+        )
 
 
 def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: float, mode: str) -> Correcting:
