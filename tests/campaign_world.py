@@ -49,7 +49,9 @@ def build_world(monkeypatch: Any) -> World:
         operating_point=lambda speed, *shears, pitch: np.full(len(STATE_NAMES), 0.1 * speed),
     )
 
-    def simulate_block(turbine, method, step, winds, initial, duration, output_step, pitch=0.0):
+    def simulate_block(
+        turbine, method, step, winds, initial, duration, output_step, pitch=0.0, corrector=None, mode="enhanced"
+    ):
         world.calls.append((method, step, [wind.mean_speed for wind in winds]))
         if method in world.raising:
             raise world.raising[method]
