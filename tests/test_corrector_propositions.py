@@ -72,7 +72,9 @@ def test_on_the_turbine_the_bound_holds_and_says_nothing_beyond_a_second():
     slopes = turbine().rhs(x0[:, None] + shifts, 7.4)
     values, modes = np.linalg.eig((slopes[:, :16] - slopes[:, 16:]) / (2 * delta))
     lipschitz = np.abs(values).max()
-    size = np.linalg.norm(np.linalg.solve(modes, (corrector.predict(found) - found.defect).T), axis=0).max() / h ** (P + 1)
+    size = np.linalg.norm(
+        np.linalg.solve(modes, (corrector.predict(found) - found.defect).T), axis=0
+    ).max() / h ** (P + 1)
     wind = [ConstantWind(7.4, 0.1, 0.02)]
 
     def bound_and_error(time):
@@ -100,7 +102,9 @@ def delta(x):
 
 
 @pytest.mark.parametrize(
-    "network", [lambda x: np.tanh(2 * x - 1), lambda x: max(x - 1.0, 0.0)], ids=["smooth network", "ReLU network"]
+    "network",
+    [lambda x: np.tanh(2 * x - 1), lambda x: max(x - 1.0, 0.0)],
+    ids=["smooth network", "ReLU network"],
 )
 def test_the_modified_equation_has_h_to_the_p_not_to_the_p_plus_1(network):
     """The enhanced solution follows x' = f + h^p (delta + N) to O(h^(p+1)); with h^(p+1), as printed, only to O(h^p)."""

@@ -76,7 +76,10 @@ def test_the_same_recipe_gives_the_same_bits_and_another_seed_others(made, tmp_p
         (lambda t: t.replace("method: heun", "method: ab4"), "correctors exist for Runge-Kutta methods only"),
         (lambda t: t.replace("step: 0.02", "step: -1"), "step: Input should be greater than 0"),
         (lambda t: t.replace("step: 0.02\n", ""), "step: Field required"),
-        (lambda t: t.replace("speeds: [7.4]", "speeds: [6, 7, 8, 9]").replace("duration: 10", "duration: 15"), "validation must hold other winds"),
+        (
+            lambda t: t.replace("speeds: [7.4]", "speeds: [6, 7, 8, 9]").replace("duration: 10", "duration: 15"),
+            "validation must hold other winds",
+        ),
         (lambda t: t.replace("samples: 300", "samples: ["), "cannot be read"),
         (lambda t: "[1, 2]", "holds no recipe"),
         (lambda t: t.replace("duration: 15", "duration: 0.02"), "training.duration: Input should be greater than or equal to 2"),
@@ -166,6 +169,15 @@ class TestInACampaign:
         with pytest.raises(InputError, match=words):
             run_campaign(self.campaign(made, **more), tmp_path / "out")
         assert not (tmp_path / "out").exists()
+
+    def test_winds_outside_those_of_the_training_are_allowed_and_said_once(self, made):
+        from fatigue_runner.campaign.plan import make_plan
+
+        campaign = self.campaign(made)
+        assert make_plan(campaign).notes == []
+        campaign["wind"]["speeds"] = [5.0, 7.4, 10.5]
+        (note,) = make_plan(campaign).notes
+        assert "quick was trained on winds of 6 to 9 m/s; 2 mean wind speed(s) lie outside, up to 10.5 m/s" in note
 
     def test_a_mode_without_a_corrector_is_refused(self, made, tmp_path):
         from fatigue_runner.campaign import run_campaign

@@ -35,7 +35,10 @@ DURATION, DISCARD, OUTPUT, ROUNDS = 130.0, 10.0, 0.6, 5
 
 def winds(count: int, duration: float, seed: int) -> list[TurbulentWind]:
     speeds = np.linspace(5.0, 10.0, count)
-    return [TurbulentWind(float(v), intensity=0.14, seed=seed + i, duration=duration) for i, v in enumerate(speeds)]
+    return [
+        TurbulentWind(float(v), intensity=0.14, seed=seed + i, duration=duration)
+        for i, v in enumerate(speeds)
+    ]
 
 
 def errors(runs: list[Any], reference: list[Any]) -> np.ndarray:
@@ -54,20 +57,28 @@ def work_precision() -> None:
     reference = simulate_block(turbine, "rk7", 0.01, unseen, start, DURATION, OUTPUT)
     block_module.clock = time.thread_time
     found = [c for c in correctors() if c.turbine == "nrel5mw"]
-    work: list[tuple[str, str, float, Any, str]] = [(f"{m} {h * 1e3:g} ms", m, h, None, "enhanced") for m, h in CLASSICAL]
-    work += [(f"{c.name} {mode}", c.method, c.step, c, mode) for c in found for mode in ("enhanced", "hybrid")]
+    work: list[tuple[str, str, float, Any, str]] = [
+        (f"{m} {h * 1e3:g} ms", m, h, None, "enhanced") for m, h in CLASSICAL
+    ]
+    work += [
+        (f"{c.name} {mode}", c.method, c.step, c, mode) for c in found for mode in ("enhanced", "hybrid")
+    ]
     times: dict[str, list[float]] = {name: [] for name, *_ in work}
     rows = {}
     for _ in range(ROUNDS + 1):
         for name, method, step, corrector, mode in work:
-            runs = simulate_block(turbine, method, step, unseen, start, DURATION, OUTPUT, corrector=corrector, mode=mode)
+            runs = simulate_block(
+                turbine, method, step, unseen, start, DURATION, OUTPUT, corrector=corrector, mode=mode
+            )
             times[name].append(sum(r.wall_time for r in runs) / len(runs) / DURATION * 1e6)
             if name not in rows:
                 e = errors(runs, reference)
                 rows[name] = float(np.median(e)), float(e.max()), runs[0].evaluations / DURATION
     print("| integrator | NRMSE median | worst | evaluations/s | CPU µs/s |\n|---|---|---|---|---|")
     for name, (median, worst, evaluations) in sorted(rows.items(), key=lambda row: row[1][0]):
-        print(f"| {name} | {median:.1e} | {worst:.1e} | {evaluations:.1f} | {np.median(times[name][1:]):.2f} |")
+        print(
+            f"| {name} | {median:.1e} | {worst:.1e} | {evaluations:.1f} | {np.median(times[name][1:]):.2f} |"
+        )
 
 
 def stability() -> None:
@@ -78,7 +89,9 @@ def stability() -> None:
     for c in correctors():
         if c.turbine == "nrel5mw":
             runs = {
-                mode: simulate_block(turbine, c.method, c.step, unseen, start, 600.0, 2.0, corrector=c, mode=mode)
+                mode: simulate_block(
+                    turbine, c.method, c.step, unseen, start, 600.0, 2.0, corrector=c, mode=mode
+                )
                 for mode in ("enhanced", "hybrid")
             }
             lost = {mode: sum(r.diverged_at is not None for r in found) for mode, found in runs.items()}

@@ -71,6 +71,24 @@ def _check_corrector(integration: Integration, turbine: Any, source: Source) -> 
         raise InputError(f"{source.where((*integration.path, 'corrector'))}: {error}") from None
 
 
+def unseen_winds(found: Sequence[Integration], winds: Sequence[Any], source: Source) -> list[str]:
+    """One sentence per corrector that meets mean wind speeds outside those it was trained on: allowed, but said."""
+    from fatigue_runner.corrector import load
+
+    notes = {}
+    for integration in found:
+        if integration.file:
+            low, high = load(integration.file).wind_range
+            outside = sorted({w.mean_speed for w in winds if not low <= w.mean_speed <= high})
+            if outside:
+                notes[integration.corrector] = (
+                    f"{source.where((*integration.path, 'corrector'))}: {integration.corrector} was trained on winds of "
+                    f"{low:.3g} to {high:.3g} m/s; {len(outside)} mean wind speed(s) lie outside, up to {outside[-1]:g} m/s: "
+                    "look at the acceptance rate"
+                )
+    return list(notes.values())
+
+
 def _unstable(integration: Integration, limit: float, turbine: Any) -> str:
     return (
         f"{integration.method} at {integration.step * 1e3:g} ms is unstable on {turbine.name}: "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from fatigue_runner.campaign import checks
 from fatigue_runner.campaign.block import Job, Setup
-from fatigue_runner.campaign.cases import Case, blocks, code_hash, make_cases, wind_cases
+from fatigue_runner.campaign.cases import Case, blocks, code_hash, integrations, make_cases, wind_cases
 from fatigue_runner.campaign.source import Source, read_source
 from fatigue_runner.campaign.spec import Campaign, parse_campaign
 from fatigue_runner.campaign.store import Store
@@ -31,6 +31,7 @@ class Plan:
     cases: list[Case]
     cell_keys: dict[str, float | None]  # by wind id
     initial: dict[str, np.ndarray]  # by wind id
+    notes: list[str] = field(default_factory=list)  # what a person should know before the run
 
     @property
     def turbine_source(self) -> str:
@@ -86,7 +87,9 @@ def make_plan(
     built = checks.build_winds(winds, spec, source)
     keys = {case.id: wind.cell_key for case, wind in zip(winds, built, strict=True)}
     initial = checks.initial_states(winds, built, spec, turbine, source)
-    return Plan(spec, source, turbine, make_cases(spec, winds, turbine.hash, source), keys, initial)
+    cases = make_cases(spec, winds, turbine.hash, source)
+    notes = checks.unseen_winds(integrations(spec, source), built, source)
+    return Plan(spec, source, turbine, cases, keys, initial, notes)
 
 
 def resolved_yaml(plan: Plan) -> str:

@@ -38,6 +38,11 @@ class Progress:
             if not self._bar.console.is_terminal:
                 self._bar.console.print(f"{what} ...")
 
+    def note(self, what: str) -> None:
+        """A sentence that stays above the bar."""
+        if self._bar is not None:
+            self._bar.console.print(f"note: {what}", markup=False)
+
     def begin(self, total: int, kept: int) -> None:
         """The number of cases, and how many of them an earlier run had finished."""
         if self._bar is not None:

@@ -53,6 +53,8 @@ def run_campaign(
     started = time.perf_counter()
     with Progress(console) as progress:
         plan = make_plan(campaign, progress.say)
+        for sentence in plan.notes:
+            progress.note(sentence)
         folder = Path(out) if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh)
         if dask is not None:

@@ -62,8 +62,8 @@ class Guard:
 class Corrector:
     """N(x, p) of x+ = eta_h(x) + h^(p+1) N, for one turbine, method and step [s].
 
-    linear (16, k) or None acts on `features.names(kind, stages, factors, history)`; layers: (outputs, inputs + 1) matrices, the bias first, on the
-    same features without factors; their sum is h^(p+1) N divided by h^(p+1).
+    linear (16, k) or None acts on `features.names(kind, stages, factors, history)`; layers: (outputs, inputs + 1) matrices, the
+    bias first, on the same features without factors; their sum is h^(p+1) N divided by h^(p+1).
     """
 
     name: str
@@ -245,7 +245,9 @@ def load(path: Path | str) -> Corrector:
     try:
         header = json.loads(metadata["header"])
         count = header.pop("layers")
-        guard: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()}
+        guard: dict[str, Any] = {
+            k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()
+        }
         header["guard"] = Guard(**guard)
         header["wind_range"], header["factors"] = tuple(header["wind_range"]), tuple(header["factors"])
         layers = tuple(tensors[f"layer{i}"].astype(float) for i in range(count))

@@ -6,6 +6,7 @@ Rows are [n][LANES], flat, as everywhere in the lane kernels.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
@@ -139,6 +140,9 @@ def dense(typing_context, rows, weights, inputs, blocks, out):
     return signature, codegen
 
 
+_dense: Any = dense  # its first argument is supplied by numba
+
+
 def pack(weights: np.ndarray) -> tuple[np.ndarray, int]:
     """(n_out, n_in) weights in the order that `dense` reads, outputs padded to whole blocks; and the number of blocks."""
     n_out, n_in = weights.shape
@@ -198,7 +202,7 @@ def correction(x, k, stage_rows, h, start, middle, end, network, rows, hidden, o
         multiply(count, factors, rows)
         inputs = (1 + len(factors)) * count
     if len(linear) > 0:
-        dense(rows, linear, inputs, 2, out)
+        _dense(rows, linear, inputs, 2, out)  # type: ignore[call-arg]  # numba passes the typing context
     else:
         for m in range(16 * LANES):
             out[m] = 0.0
@@ -210,7 +214,7 @@ def correction(x, k, stage_rows, h, start, middle, end, network, rows, hidden, o
             blocks = (sizes[layer + 1] + BLOCK - 1) // BLOCK
             size = blocks * BLOCK * n_in
             source = rows if layer == 0 else hidden[(layer - 1) % 2]
-            dense(source, net[place : place + size], n_in, blocks, hidden[layer % 2])
+            _dense(source, net[place : place + size], n_in, blocks, hidden[layer % 2])  # type: ignore[call-arg]  # numba passes the typing context
             place += size
             if layer < layers - 1:
                 activate(hidden[layer % 2], sizes[layer + 1], activation)
