@@ -50,7 +50,16 @@ def build_world(monkeypatch: Any) -> World:
     )
 
     def simulate_block(
-        turbine, method, step, winds, initial, duration, output_step, pitch=0.0, corrector=None, mode="enhanced"
+        turbine,
+        method,
+        step,
+        winds,
+        initial,
+        duration,
+        output_step,
+        pitch=0.0,
+        corrector=None,
+        mode="enhanced",
     ):
         world.calls.append((method, step, [wind.mean_speed for wind in winds]))
         if method in world.raising:

@@ -49,6 +49,10 @@ def test_an_unwritable_cache_folder_only_costs_a_warning(tmp_path):
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
-        env={"NUMBA_CACHE_DIR": str(blocked), "PATH": "/usr/bin:/bin", "PYTHONPATH": ":".join(p for p in sys.path if p)},
+        env={
+            "NUMBA_CACHE_DIR": str(blocked),
+            "PATH": "/usr/bin:/bin",
+            "PYTHONPATH": ":".join(p for p in sys.path if p),
+        },
     )
     assert done.returncode == 0, done.stderr
