@@ -201,6 +201,10 @@ def train(
     step: Annotated[float | None, typer.Option("--step", help="Another step [s] than the recipe's.")] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Another seed than the recipe's.")] = None,
     name: Annotated[str | None, typer.Option("--name", help="Another name than the recipe's.")] = None,
+    tune: Annotated[
+        int, typer.Option("--tune", min=0, help="Networks: first search with this many Optuna trials.")
+    ] = 0,
+    tune_epochs: Annotated[int, typer.Option("--tune-epochs", min=1, help="Epochs of a trial.")] = 100,
 ) -> None:
     """Train a corrector: NAME.safetensors and its card NAME.md beside the recipe.
 
@@ -213,9 +217,15 @@ def train(
         fatigue-runner train correctors/rk4-100ms.yaml --step 0.08 --name rk4-80ms --out runs
     """
     from fatigue_runner.campaign.initial import initial_state
-    from fatigue_runner.cli_tables import train_with_progress
+    from fatigue_runner.cli_tables import train_with_progress, tune_with_progress
 
-    train_with_progress(recipe, out, initial_state, {"step": step, "seed": seed, "name": name}, _console())
+    overrides: dict[str, Any] = {"step": step, "seed": seed, "name": name}
+    if tune:
+        settings = tune_with_progress(recipe, out, initial_state, overrides, tune, tune_epochs, _console())
+        if settings is None:
+            raise typer.Exit(130)
+        overrides |= {"training": settings, "seed": None}
+    train_with_progress(recipe, out, initial_state, overrides, _console())
 
 
 def _console() -> Console:

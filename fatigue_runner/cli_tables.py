@@ -235,3 +235,29 @@ def train_with_progress(
     for label, value in validation_rows(made.corrector)[:7]:
         console.print(f"{label}: {value}")
     console.print(f"corrector: {made.path}\ncard: {made.card}")
+
+
+def tune_with_progress(
+    recipe: Any,
+    out: Any,
+    initial_state: Any,
+    overrides: dict[str, Any],
+    trials: int,
+    epochs: int,
+    console: Console,
+) -> dict[str, Any] | None:
+    """Search for a network's settings, a line per trial; None where Ctrl-C ended it: the same command goes on."""
+    from fatigue_runner.corrector.training_recipe import tune_file
+
+    def trial(report: Any) -> None:
+        value = "-" if report.value is None else f"{report.value:.3e}"
+        settings = ", ".join(
+            f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in report.settings.items()
+        )
+        console.print(f"trial {report.number}: {report.state}, validation {value}; {settings}")
+
+    storage = (out or recipe.parent) / f".{overrides.get('name') or recipe.stem}.tuning.db"
+    with console.status(f"{trials} trials of {epochs} epochs (Ctrl-C ends, the same command goes on)"):
+        settings, stopped = tune_file(recipe, storage, initial_state, trials, epochs, overrides, trial)
+    console.print("best: " + ", ".join(f"{k}: {v}" for k, v in settings.items()))
+    return None if stopped else settings

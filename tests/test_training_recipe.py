@@ -132,3 +132,36 @@ def test_the_papers_networks_are_closer_than_rk3_on_winds_that_they_have_not_see
         return [float(np.mean(((r.state - e.state) / extent) ** 2)) for r, e in zip(runs, exact, strict=True)]
 
     assert all(np.array(errors("heun", corrector=corrector)) < np.array(errors("rk3")))
+
+
+def test_train_tunes_first_and_keeps_what_it_found(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("optuna", reason="tuning needs the extra `train`")
+    import sys
+
+    from fatigue_runner.cli import main
+
+    recipe = tmp_path / "tiny.yaml"
+    recipe.write_text(
+        "name: tiny\nfamily: mlp\nmethod: heun\nstep: 0.01\nspeeds: {train: [6, 8], validation: [7]}\nduration: 0.2\n"
+        "training: {hidden: [6], epochs: 3}\n"
+    )
+    monkeypatch.setattr(
+        sys,
+        "argv",
+        ["fatigue-runner", "train", str(recipe), "--tune", "2", "--tune-epochs", "1", "--seed", "4"],
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code in (0, None)
+    assert capsys.readouterr().out.count("trial ") == 2
+    made = artefact.load(tmp_path / "tiny.safetensors")
+    assert made.training["seed"] == 4 and "'scheduler':" in made.recipe and "'batch':" in made.recipe
+    assert (tmp_path / ".tiny.tuning.db").exists() and not (tmp_path / ".tiny.checkpoint").exists()
+
+
+def test_an_affine_recipe_has_nothing_to_tune():
+    from fatigue_runner.corrector.training_recipe import tune_file
+
+    path = sorted(CORRECTORS.glob("heun-10ms*.yaml"))[0]
+    with pytest.raises(InputError, match="nothing to tune"):
+        tune_file(path, Path("unused.db"), initial_state, 1, 1, {})

@@ -165,12 +165,17 @@ def train_recipe(
     checkpoint: Path | None = None,
     text: str = "",
 ) -> tuple[Corrector, Any]:
-    """The corrector that a recipe makes, guarded, and the training's history; `text`: the recipe's file, kept in the artefact."""
+    """The corrector that a recipe makes, guarded, and the training's history; `text`: the recipe's file, kept in the artefact.
+
+    `checkpoint` is removed when the training has ended by itself: another seed or setting would be refused by it.
+    """
     from fatigue_runner.corrector.training import train_mlp
 
     train, validation = sample_sets(recipe, turbine, initial_state)
     settings = recipe.settings()
     layers, history = train_mlp(*pair_sets(recipe, train, validation), settings, progress, checkpoint)
+    if checkpoint is not None and not history.stopped:
+        checkpoint.unlink(missing_ok=True)
     made = {
         "samples": len(train.plain), "epochs": len(history.train), "best_epoch": history.best_epoch,
         "validation_loss": history.best, "training_loss": history.train[history.best_epoch - 1],
@@ -195,6 +200,37 @@ def tune_recipe(
 
     train, validation = pair_sets(recipe, *sample_sets(recipe, turbine, initial_state))
     return tune(train, validation, recipe.settings(), trials, epochs, storage, progress)
+
+
+def tune_file(
+    path: Path,
+    storage: Path,
+    initial_state: InitialState,
+    trials: int,
+    epochs: int,
+    overrides: Mapping[str, Any],
+    progress: Callable[..., None] | None = None,
+) -> tuple[dict[str, Any], bool]:
+    """Settings for `training` of the recipe file, its own with the best trial's in them; and whether Ctrl-C ended the search.
+
+    Raises InputError for a recipe that is not of a network.
+    """
+    from fatigue_runner.corrector.recipes import read
+    from fatigue_runner.turbine import load_turbine
+
+    family, data, _ = read(path)
+    if family != "mlp":
+        raise InputError(f"{path}: a corrector of family {family!r} has nothing to tune; its fit is exact")
+    changed = {k: v for k, v in overrides.items() if v is not None}
+    own = dict(data.get("training") or {})
+    if "seed" in changed:
+        own["seed"] = changed.pop("seed")
+    recipe = parse_recipe({**data, **changed, "training": own}, str(path))
+    tuned = tune_recipe(
+        recipe, load_turbine(recipe.turbine), initial_state, trials, epochs, storage, progress
+    )
+    chosen = ("batch", "learning_rate", "smallest_rate", "scheduler", "factor", "patience")
+    return own | {name: getattr(tuned.settings, name) for name in chosen}, tuned.stopped
 
 
 def guarded(
