@@ -177,7 +177,10 @@ class TestInACampaign:
         assert make_plan(campaign).notes == []
         campaign["wind"]["speeds"] = [5.0, 7.4, 10.5]
         (note,) = make_plan(campaign).notes
-        assert "quick was trained on winds of 6 to 9 m/s; 2 mean wind speed(s) lie outside, up to 10.5 m/s" in note
+        assert (
+            "quick was trained on winds of 6 to 9 m/s; 2 mean wind speed(s) lie outside, up to 10.5 m/s"
+            in note
+        )
 
     def test_a_mode_without_a_corrector_is_refused(self, made, tmp_path):
         from fatigue_runner.campaign import run_campaign
