@@ -121,6 +121,57 @@ def modes() -> Iterator[Check]:
             yield Check(section, f"{name}: damping ratio", OPENFAST, their_damping, 100 * damping, "%")
 
 
+def equations() -> Iterator[tuple[str, str, str]]:
+    """(check, against what, result) of the equations of motion, with the helpers of the tests."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+    import cadynturb
+    import test_equations as t
+
+    turbine, x = t.free_turbine(), t.violent_states(8)
+    model = t.IndependentModel(turbine.parameters)
+    expected = np.array([model.accelerations(row) for row in x])
+    worst = (np.abs(turbine.rhs(x.T, 8.0)[8:].T - expected) / (1 + np.abs(expected))).max()
+    yield "accelerations in violent states", "a second formulation without frames", f"{worst:.0e} relative"
+    drift = 0.0
+    for run in simulate_block(turbine, "rk7", 0.005, [ConstantWind(8.0)] * 8, x, 100.0, 10.0):
+        energy = np.array([model.energy(row) for row in run.state])
+        drift = max(drift, np.ptp(energy) / (0.5 * 3.5e7 * run.state[0, 14] ** 2))
+    yield (
+        "energy over 100 s, nothing damping or driving",
+        "conservation",
+        f"drift {drift:.0e} of the rotation's",
+    )
+    if not cadynturb.SHARED.is_dir():
+        yield "CADynTurb's states and trajectories", "its reference data", "not here"
+        return
+    data = cadynturb.load()
+    given = {k: v for k, v in cadynturb.tables(data).items() if k in t.kernel.TABLES}
+    tables = {"tip_speed_ratio": data["tip_speed_ratio"], "coefficients": given}
+    other = load_turbine(
+        {"parameters": cadynturb.parameters(data), "tables": tables, "interpolation": "bilinear"}
+    )
+    reference = np.load(cadynturb.SHARED / "t2b1i1cg_reference.npz")
+    states, u, theirs = reference["x"].T, reference["u"].T, reference["xdot"].T
+    ours = other.rhs(states, u[4], u[6], u[5])
+    ours[15] += (2.332287 * states[15] ** 2 - u[0]) / other.parameters["g_i"]
+    rms = 100 * np.sqrt(((ours - theirs)[8:] ** 2).mean(axis=1) / (theirs[8:] ** 2).mean(axis=1))
+    yield (
+        "accelerations in 400 random states",
+        "CADynTurb",
+        f"{np.median(rms):.1f} % rms, at most {rms.max():.1f} %",
+    )
+    winds = [ConstantWind(float(v)) for v in reference["vwind"]]
+    runs = simulate_block(other, "rk7", 0.005, winds, reference["V2"][:, 0], 20.0, 0.05)
+    errors = np.array(
+        [
+            100 * np.sqrt(((run.state - v) ** 2).mean(axis=0)) / np.ptp(v, axis=0)
+            for run, v in zip(runs, reference["V2"], strict=True)
+        ]
+    )
+    result = f"{np.median(errors):.1f} % of each state's range, at most {errors.max():.1f} %"
+    yield "trajectories of 20 s at three winds", "CADynTurb", result
+
+
 def checks() -> list[Check]:
     return [check for part in (structure, rotor, operation, modes) for check in part()]
 
@@ -142,6 +193,13 @@ def main() -> int:
             print("| " + " | ".join((c.name, *values)) + " |")
         else:
             print(f"  {c.name:45s}{values[0]:>18s}{values[1]:>18s}{values[2]:>10s}")
+    print(
+        "\n## The equations themselves\n\n| check | against | result |\n|---|---|---|"
+        if markdown
+        else "\nEquations"
+    )
+    for row in equations():
+        print("| " + " | ".join(row) + " |" if markdown else "  " + "; ".join(row))
     return 0
 
 

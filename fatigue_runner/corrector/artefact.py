@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -196,9 +196,6 @@ class Corrector:
             np.array(sizes),
             kind,
         )
-
-    def with_guard(self, guard: Guard) -> Corrector:
-        return replace(self, guard=guard)
 
 
 def save(corrector: Corrector, path: Path) -> None:

@@ -73,7 +73,7 @@ def single_steps(
     """One step of `method`, and one in `substeps` of `accurate`, from each of states (n, 16) under wind pieces (n, 4, 3)."""
     from fatigue_runner.integrators.correction import FIXED_ROWS, RAW_ROWS
     from fatigue_runner.integrators.defects import step_samples
-    from fatigue_runner.integrators.kernel_data import runge_kutta_data
+    from fatigue_runner.integrators.kernel_data import runge_kutta_data, stage_rows
     from fatigue_runner.turbine.lanes import LANES, from_groups, to_groups, work_space
 
     n = len(states)
@@ -97,13 +97,6 @@ def single_steps(
         from_groups(exact, 16, n).T.copy(),
         pieces,
     )
-
-
-def stage_rows(stages: int) -> NDArray[np.int64]:
-    """Rows of the loops' slopes that hold the stages: the first one's changes from step to step."""
-    from fatigue_runner.integrators.loops import RING
-
-    return np.array([0, *(RING - 1 + i for i in range(1, stages))], dtype=np.int64)
 
 
 def tableau(method: str) -> Any:

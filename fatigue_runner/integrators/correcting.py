@@ -47,8 +47,7 @@ class Correcting:
 def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: float, mode: str) -> Correcting:
     """Bind a `corrector.Corrector` to a run. Raises InputError for an unknown mode, CorrectorError where it does not fit."""
     from fatigue_runner.integrators.corrected import NORM_MAX, NORM_RMS
-    from fatigue_runner.integrators.kernel_data import runge_kutta_data
-    from fatigue_runner.integrators.loops import RING
+    from fatigue_runner.integrators.kernel_data import runge_kutta_data, stage_rows
     from fatigue_runner.integrators.methods import method as find_method
 
     if mode not in MODES:
@@ -56,7 +55,7 @@ def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: floa
     corrector.bind(turbine, method.name, step)
     data = runge_kutta_data(method)
     stages = len(data[0][3])
-    rows = np.array([0, *(RING - 1 + i for i in range(1, stages))], dtype=np.int64)
+    rows = stage_rows(stages)
     guard = corrector.guard
     if guard.substeps == 0:
         if method.name not in SHARING:

@@ -49,6 +49,11 @@ def stage_table(tableau: ButcherTableau) -> tuple[Any, Any, Any, Any]:
     return rows, weights, np.array([len(t) for t in terms]), c[:computed].copy()
 
 
+def stage_rows(stages: int) -> NDArray[np.int64]:
+    """Rows of the loops' slopes that hold the stages; the first one's is set anew in every step."""
+    return np.array([0, *(RING - 1 + i for i in range(1, stages))], dtype=np.int64)
+
+
 def runge_kutta_data(tableau: ButcherTableau) -> tuple[Any, ...]:
     """`method` of `loops.runge_kutta`: (stages, result, error), each rows, weights, count(s)."""
     _, b, e, _ = tableau.arrays()
