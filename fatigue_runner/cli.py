@@ -6,6 +6,7 @@ Exit codes: 0 all done; 1 some cases failed or diverged; 2 the input was wrong; 
 from __future__ import annotations
 
 import sys
+from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -122,17 +123,20 @@ def run(
     from fatigue_runner.cli_tables import print_results
 
     console = _console()
-    watch = None
-    if live or pace is not None:
-        from fatigue_runner.viewer.live import watcher
+    with ExitStack() as until_the_end:
+        watch = None
+        if live or pace is not None:
+            from fatigue_runner.viewer.live import watcher
 
-        watch = watcher(pace=pace, case=live_case, port=viewer_port, say=console.print)
-    try:
-        results = run_campaign(
-            campaign, out, workers=workers, fresh=fresh, dask=dask, console=console, watch=watch
-        )
-    except KeyboardInterrupt:
-        raise CampaignInterrupted("interrupted; the same command goes on") from None
+            watch = until_the_end.enter_context(
+                watcher(pace=pace, case=live_case, port=viewer_port, say=console.print)
+            )
+        try:
+            results = run_campaign(
+                campaign, out, workers=workers, fresh=fresh, dask=dask, console=console, watch=watch
+            )
+        except KeyboardInterrupt:
+            raise CampaignInterrupted("interrupted; the same command goes on") from None
     print_results(results, console)
     raise typer.Exit(results.exit_code)
 

@@ -28,7 +28,17 @@ MAY_IMPORT = {
     "report": {"fatigue", "logbook"},
     "viewer": {"logbook", "turbine"},
     "campaign": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "report"},
-    "benchmark": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "campaign", "report"},
+    "benchmark": {
+        "turbine",
+        "wind",
+        "integrators",
+        "corrector",
+        "fatigue",
+        "logbook",
+        "campaign",
+        "report",
+        "viewer",
+    },
     "api": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "campaign"},
     "cli": None,  # anything: it is the roof
     "cli_tables": None,

@@ -18,8 +18,9 @@ from viewer_example import motion, write
 from fatigue_runner.errors import InputError
 from fatigue_runner.logbook import LogWriter
 from fatigue_runner.viewer import bridge, live, window
-from fatigue_runner.viewer.live import Watched
+from fatigue_runner.viewer.live import BridgeProcess, Look, Watched
 from fatigue_runner.viewer.overview import Overview, chart, ticks
+from fatigue_runner.viewer.player import Player
 
 
 def record(case_id: str, **row: object) -> dict:
@@ -106,7 +107,7 @@ def test_ticks_are_round_and_enclose_the_values(low, high):
 def test_log_is_followed_while_it_is_written_and_played_at_its_pace(tmp_path):
     whole = motion(201)  # 10 s
     first, rest = cut(whole, 0, 101), cut(whole, 101, 201)
-    player = bridge.Player(tmp_path / "case.mcap", pace=2.0)
+    player = Player(tmp_path / "case.mcap", pace=2.0)
     assert not player.read(now=0.0), "there is no log yet"
     with LogWriter(tmp_path / "case.mcap", run={"turbine": "nrel5mw"}, chunk_seconds=0.0) as log:
         log.append(first)
@@ -150,25 +151,102 @@ def test_missing_viewer_is_said_before_anything_runs(monkeypatch):
 # --- the process beside the run, in all that can happen to its viewer
 
 
-def started(folder: Path, port: int, **told: object) -> subprocess.Popen[bytes]:
-    return live.start(Watched(str(folder), 1, [["u10_rk3_20ms"]], 1, port=port, **told))
+def started(folder: Path, port: int, **look: object) -> BridgeProcess:
+    made = BridgeProcess(Look(port=port, **look))
+    made.tell(Watched(str(folder), 1, [["u10_rk3_20ms"]], 1))
+    return made
+
+
+def finished(made: BridgeProcess) -> subprocess.Popen[bytes]:
+    """The bridge's process after the run told it that all is over."""
+    made.over()
+    made.close()
+    return made.process
 
 
 def test_bridge_ends_with_the_run_when_there_is_no_viewer(tmp_path):
-    process = started(tmp_path, window.free_port())
-    live.finish(process)
-    assert process.wait(timeout=60) == 0
+    assert finished(started(tmp_path, window.free_port())).wait(timeout=60) == 0
+
+
+def test_bridge_of_a_campaign_that_was_refused_ends():
+    made = BridgeProcess(Look(port=window.free_port()))
+    made.close()
+    assert made.process.wait(timeout=60) == 0
+
+
+@pytest.mark.parametrize(
+    ("workers", "done", "elapsed", "over", "opens"),
+    [
+        (1, 0, 0.0, False, True),  # cores to spare
+        (3, 0, 1.0, False, False),  # too early to tell
+        (3, 5, 5.0, False, False),  # 20 cases in 20 s: opening a viewer would cost it more than a percent
+        (3, 5, 16.0, False, True),  # 20 cases in 64 s
+        (3, 0, 31.0, False, True),  # no case in half a minute
+        (3, 5, 5.0, True, True),  # the run is over
+    ],
+)
+def test_viewer_opens_at_once_only_where_that_costs_the_run_nothing_that_counts(
+    tmp_path, monkeypatch, workers, done, elapsed, over, opens
+):
+    monkeypatch.setattr(bridge, "cores", lambda: 4)
+    append(tmp_path, record("kept of an earlier run"))
+    told = Watched(str(tmp_path), 21, [[f"a{i}" for i in range(10)], [f"b{i}" for i in range(10)]], workers)
+    room = bridge.Room(told, 1000.0)
+    if done:
+        append(tmp_path, *(record(f"a{i}") for i in range(done)))
+    assert room.is_there(1000.0 + elapsed, over) is opens
+
+
+def test_bridge_that_waits_has_loaded_nothing_that_takes_time():
+    code = "import sys, fatigue_runner.viewer.bridge; sys.exit(str({'numpy', 'rerun', 'mcap', 'numba'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == "set()"
 
 
 def test_run_waits_for_no_bridge_that_does_not_answer(tmp_path):
-    process = started(tmp_path, window.free_port())
-    os.kill(process.pid, signal.SIGSTOP)
+    made = BridgeProcess(Look(port=window.free_port()))
+    os.kill(made.process.pid, signal.SIGSTOP)
     try:
-        live.finish(process)
-        assert process.poll() is None
+        many = [[f"case {i} of a large campaign" for i in range(20000)]]  # far more than a pipe holds
+        made.tell(Watched(str(tmp_path), 20000, many, 1))
+        assert finished(made).poll() is None
     finally:
-        process.kill()
-        process.wait()
+        made.process.kill()
+        made.process.wait()
+
+
+def test_run_goes_on_when_the_bridge_cannot_be_started_or_is_gone(tmp_path, monkeypatch):
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(12, "Cannot allocate memory")
+
+    said: list[str] = []
+    with monkeypatch.context() as failing:
+        failing.setattr(subprocess, "Popen", refuse)
+        with live.Watcher(Look(port=1), said.append) as watch, watch(tmp_path, 1, [["a"]], 1):
+            pass
+    assert said == ["live view: it could not be started (Cannot allocate memory); the run goes on"]
+    with live.Watcher(Look(port=window.free_port()), said.append) as watch:
+        watch.bridge.process.kill()
+        watch.bridge.process.wait()
+        with watch(tmp_path, 1, [["a"]], 1):
+            pass
+
+
+@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="this system has no idle class")
+def test_bridge_runs_only_when_nothing_else_of_the_run_s_session_wants_to(tmp_path):
+    made = started(tmp_path, window.free_port())
+    try:
+        for _ in range(200):
+            if os.sched_getscheduler(made.process.pid) == os.SCHED_IDLE:
+                break
+            time.sleep(0.05)
+        assert os.sched_getscheduler(made.process.pid) == os.SCHED_IDLE
+        # Linux weighs sessions first: the idle class counts within one
+        assert os.getsid(made.process.pid) == os.getsid(0)
+        assert os.getpgid(made.process.pid) != os.getpgid(0), "Ctrl-C is for the run"
+    finally:
+        made.process.kill()
+        made.process.wait()
 
 
 def test_bridge_that_stands_still_ends_itself_even_inside_a_call_that_never_returns():
@@ -253,8 +331,7 @@ class TestRun:
         port = window.free_port()
         with window.viewer("--serve-grpc", "--port", str(port)) as process:
             wait_for(port)
-            playing = started(tmp_path, port, pace=1.0)
-            live.finish(playing)
+            playing = finished(started(tmp_path, port, pace=1.0))
             time.sleep(3.0)
             assert playing.poll() is None, "it plays on beyond the end of the run"
             process.kill()
@@ -267,9 +344,7 @@ class TestRun:
             wait_for(port)
             os.kill(process.pid, signal.SIGSTOP)
             try:
-                playing = started(tmp_path, port, pace=1e4, stall=5.0)
-                live.finish(playing)
-                playing.wait(timeout=60)
+                finished(started(tmp_path, port, pace=1e4, stall=5.0)).wait(timeout=60)
             finally:
                 os.kill(process.pid, signal.SIGCONT)
 

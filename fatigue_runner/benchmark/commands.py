@@ -1,4 +1,4 @@
-"""`fatigue-runner benchmark`: kernel, work-precision, logs."""
+"""`fatigue-runner benchmark`: kernel, work-precision, paper, stability, logs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
-    help="Measure the kernel, every integrator's error over cost, the logs; each in one run.",
+    help="Measure the kernel, every integrator's error over cost, the paper's experiment, the logs; each in one run.",
 )
 
 Json = Annotated[
@@ -35,6 +35,19 @@ def _write(result: Any, path: Path | None) -> None:
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); give --json another path") from None
     typer.echo(f"figures: {path}")
+
+
+def _read(path: Path) -> Any:
+    from fatigue_runner.errors import InputError
+
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} is not the JSON of an earlier run ({error})") from None
+
+
+def _say(what: str) -> None:
+    typer.echo(what, err=True)
 
 
 @app.command()
@@ -59,38 +72,119 @@ def kernel(
 
 @app.command(name="work-precision")
 def work_precision(
-    campaigns: Annotated[
-        list[Path] | None,
+    campaign: Annotated[
+        Path | None,
         typer.Argument(
-            metavar="[CAMPAIGN]...", help="Campaign files whose winds to use; default: built-in cases."
+            metavar="[CAMPAIGN]", help="Campaign file; default: the shipped campaigns/work_precision.yaml."
         ),
     ] = None,
-    repeats: Annotated[int, typer.Option("--repeats", min=1, help="Interleaved timing rounds.")] = 5,
+    rounds: Annotated[
+        int | None,
+        typer.Option("--rounds", min=1, help="Interleaved timing rounds; default as the file says."),
+    ] = None,
+    workers: Annotated[
+        int,
+        typer.Option("--workers", "-w", min=1, help="Processes for the errors; times are measured in one."),
+    ] = 2,
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", "-o", help="Folder for the figures and the page `work-precision.md`.", show_default=False
+            "--out",
+            "-o",
+            help="Folder for the pages `work-precision*.md` and their figures.",
+            show_default=False,
         ),
     ] = None,
     json: Json = None,
+    errors_only: Annotated[
+        bool,
+        typer.Option("--errors-only", help="Leave the times out; `--reuse` of the JSON adds them later."),
+    ] = False,
+    reuse: Annotated[
+        Path | None,
+        typer.Option(
+            "--reuse",
+            metavar="FILE",
+            help="JSON of an earlier run: keep its errors, measure the times.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Error over cost of every integrator at many steps on the same cases; the cheapest one for an accuracy, in words.
+    """Error over cost of every integrator and every corrector on the same unseen winds; which one is cheapest, in words.
 
-    All registered methods run, and what the campaign lists beside them.
+    All registered methods and all shipped correctors run, and what the campaign lists beside them.
 
     Examples:
 
-        fatigue-runner benchmark work-precision
+        fatigue-runner benchmark work-precision --out docs
 
         fatigue-runner benchmark work-precision campaigns/quickstart.yaml --out work --json work.json
+
+        fatigue-runner benchmark work-precision --errors-only --json errors.json
+
+        fatigue-runner benchmark work-precision --reuse errors.json --out docs
     """
     from fatigue_runner.benchmark import page, text
 
-    result = page.measure(list(campaigns or []), repeats, lambda what: typer.echo(what, err=True))
+    earlier = None if reuse is None else (_read(reuse), str(reuse))
+    result = page.measure(
+        campaign, rounds=rounds, workers=workers, timed=not errors_only, earlier=earlier, say=_say
+    )
     for part in result["cases"]:
         typer.echo("\n".join(text.cases(part)) + "\n")
     if out is not None:
         typer.echo(f"page: {page.write(result, out, out / 'images')}")
+    _write(result, json)
+
+
+@app.command()
+def paper(
+    correctors: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[CORRECTOR]...",
+            help="Names or paths; default: every shipped one for the paper's turbine.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for the figures.", show_default=False)
+    ] = None,
+    json: Json = None,
+) -> None:
+    """The experiment of arXiv:2504.05493 anew: its methods and network on 200 winds in range and 200 beyond, as box plots.
+
+    Example:
+
+        fatigue-runner benchmark paper --out docs/images
+    """
+    from fatigue_runner.benchmark import paper as measured
+    from fatigue_runner.benchmark import paper_figures
+
+    results = measured.both(correctors or None, _say)
+    for result in results:
+        typer.echo("\n".join(measured.text(result)) + "\n")
+    if out is not None:
+        for path in paper_figures.draw(*results, out):
+            typer.echo(f"figure: {path}")
+    _write([measured.to_json(r) for r in results], json)
+
+
+@app.command()
+def stability(
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Unseen turbulent winds.")] = 100,
+    duration: Annotated[float, typer.Option("--duration", min=1.0, help="Length of each [s].")] = 600.0,
+    json: Json = None,
+) -> None:
+    """Every shipped corrector over many unseen winds: what diverges, enhanced and hybrid, and how often the hybrid accepts.
+
+    Example:
+
+        fatigue-runner benchmark stability
+    """
+    from fatigue_runner.benchmark import stability as measured
+
+    result = measured.measure(seeds, duration, _say)
+    typer.echo("\n".join(measured.text(result)))
     _write(result, json)
 
 
@@ -113,3 +207,28 @@ def logs(
     result = measured.benchmark_logs(rows, repeats)
     Console().print(measured.table(result))
     _write(result, json)
+
+
+@app.command()
+def live(
+    rounds: Annotated[int, typer.Option("--rounds", min=1, help="Runs of every situation, in turn.")] = 5,
+    duration: Annotated[float, typer.Option("--duration", min=1, help="Simulated seconds per case.")] = 120.0,
+    at_once: Annotated[
+        bool, typer.Option("--at-once", help="Open the viewer in the middle of the run, as in a long one.")
+    ] = False,
+    json: Json = None,
+) -> None:
+    """What it costs a campaign to be watched: viewer open, absent, stopped, killed, beside the same campaign unwatched.
+
+    Example:
+
+        fatigue-runner benchmark live --json live.json
+    """
+    from rich.console import Console
+
+    from fatigue_runner.benchmark import live as measured
+
+    result = measured.measure(rounds, duration, at_once=at_once, say=lambda what: typer.echo(what, err=True))
+    Console().print(measured.table(result))
+    _write(result, json)
+    raise typer.Exit(0 if result["met"] else 1)

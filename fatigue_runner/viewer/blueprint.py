@@ -37,8 +37,11 @@ def first_screen(cases: Sequence[Viewed], playing: bool = True) -> rrb.Blueprint
     )
 
 
-def live_screen(cases: Sequence[Viewed], paced: bool) -> rrb.Blueprint:
-    """The campaign as it fills, beside the case that is shown; only the campaign before there is one."""
+def live_screen(cases: Sequence[Viewed], paced: bool, playing: bool = True) -> rrb.Blueprint:
+    """The campaign as it fills, beside the case that is shown; only the campaign before there is one.
+
+    paced: the case comes in at its pace, and the time cursor follows; playing: else it is played again and again.
+    """
     campaign = [
         rrb.TextDocumentView(origin="campaign/cases", name="Campaign"),
         rrb.Spatial2DView(origin="campaign/chart", name="DEL over wind speed", background=_BACKGROUND),
@@ -67,7 +70,7 @@ def live_screen(cases: Sequence[Viewed], paced: bool) -> rrb.Blueprint:
         rrb.TimePanel(
             state="collapsed",
             timeline=TIMELINE,
-            play_state="following" if paced else "playing",
+            play_state="following" if paced or not playing else "playing",
             loop_mode="all",
         ),
         rrb.SelectionPanel(state="hidden"),

@@ -1,13 +1,18 @@
-"""The process between a running campaign and the viewer: `python -m fatigue_runner.viewer.bridge TOLD.json`.
+"""The process between a running campaign and the viewer: `python -m fatigue_runner.viewer.bridge LOOK HANDLE`.
 
-It only reads: records and logs of the run folder, as they grow. It has the lowest priority, and ends by itself: when the run is
-over (its standard input closes) and all is sent or played, when the viewer is gone, or when sending has stood still for a while,
-which is how a stopped viewer shows.
+LOOK: JSON of `live.Look`; HANDLE: an open file in which the JSON of `live.Watched` stands once standard input says so.
+
+It only reads: records and logs of the run folder, as they grow. It runs when nothing else wants to, and ends by itself: when the run is
+over and all is sent or played, when the viewer is gone, or when sending has stood still for a while, which is how a stopped viewer
+shows.
+
+Even a process of the idle class costs those that work something: a worker that wakes up on its core waits for the next tick of the
+clock, milliseconds, where the kernel is a server's. So where all cores are busy, and the campaign is so short that opening a viewer
+would cost it more than a percent, the viewer opens with its end. Until then this process has loaded nothing and sleeps.
 """
 
 from __future__ import annotations
 
-import contextlib
 import faulthandler
 import json
 import os
@@ -18,201 +23,116 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from fatigue_runner.errors import FatigueRunnerError
-from fatigue_runner.logbook import Log, LogTail
 from fatigue_runner.viewer import window
-from fatigue_runner.viewer.cases import Viewed, as_viewed
-from fatigue_runner.viewer.live import Watched
-from fatigue_runner.viewer.overview import CHART, Overview, chart
+from fatigue_runner.viewer.live import Look, Watched
+from fatigue_runner.viewer.priority import yield_to_others
 
 LOOK_SECONDS = 0.05
-OVERVIEW_SECONDS = 0.4  # between two pictures of the campaign
 CONNECT_SECONDS = 30.0
-START_SECONDS = 300.0  # loading Rerun at the lowest priority beside busy workers can take a minute
+START_SECONDS = 900.0  # loading Rerun when nothing else wants to run can take minutes
+LONG_RUN = 60.0  # s; opening a viewer takes some 2 s of a core, and those that work lose a fifth of that
+UNKNOWN_RUN = 30.0  # s without a finished case after which a run counts as long
+SPARE_CORES = 2  # beside the workers': one for the run's own process, one for the viewer
 
-_STATUS = ("accepted", "discrepancy", "threshold", "local_error", "reference_error")
+
+class Ear:
+    """What the run says on our standard input: what it is, that it is over; and that its program is gone."""
+
+    told = over = gone = False
+
+    def listen(self) -> None:
+        """Take in what was said; waits for nothing."""
+        while not self.gone and select.select([sys.stdin], [], [], 0.0)[0]:
+            heard = os.read(sys.stdin.fileno(), 1024)
+            self.gone = not heard
+            self.told |= b"t" in heard
+            self.over |= self.gone or b"o" in heard
+
+    def wait(self, seconds: float) -> None:
+        """Sleep until something is said, at most so long."""
+        if self.gone:
+            time.sleep(seconds)
+        elif select.select([sys.stdin], [], [], seconds)[0]:
+            self.listen()
 
 
-class Player:
-    """The shown case: follows its log while that is written, and says which rows are due.
+class Room:
+    """Whether the viewer may open now."""
 
-    pace: multiple of real time, None for as fast as it is there.
-    """
+    def __init__(self, told: Watched, now: float) -> None:
+        self._records = Path(told.folder) / "cases.jsonl"
+        self._pending = sum(map(len, told.jobs))
+        self._before, self._began = self._lines(), now
+        self.spare = cores() - told.workers >= SPARE_CORES
 
-    def __init__(self, path: Path, pace: float | None) -> None:
-        self.path, self.pace = path, pace
-        self.viewed: Viewed | None = None
-        self.sent = 0
-        self.ended = False
-        self._tail: LogTail | None = None
-        self._began = 0.0
-
-    def read(self, now: float) -> bool:
-        """Take in what was added to the log; True when the case is seen for the first time."""
-        if self.ended:
-            return False
-        if self._tail is None:
-            try:
-                self._tail = LogTail(self.path)
-            except FatigueRunnerError:
-                return False
-        block = self._tail.poll()
-        self.ended = self._tail.ended
-        if block is None or not len(block.time):
-            return False
-        if self.viewed is None:
-            self.viewed, self._began = as_viewed([(self.path, block)])[0], now
+    def is_there(self, now: float, over: bool) -> bool:
+        """Yes where cores are idle, where the run is over, and where it takes so long that opening a viewer hardly counts."""
+        if over or self.spare:
             return True
-        self.viewed.log = extended(self.viewed.log, block)
-        return False
+        elapsed, done = now - self._began, self._lines() - self._before
+        if done <= 0:
+            return elapsed >= UNKNOWN_RUN
+        return elapsed * self._pending / done >= LONG_RUN
 
-    def due(self, now: float) -> int:
-        """Number of rows that should be on the screen."""
-        if self.viewed is None:
-            return 0
-        time_ = self.viewed.log.time
-        if self.pace is None:
-            return len(time_)
-        return int(np.searchsorted(time_, time_[0] + self.pace * (now - self._began), side="right"))
-
-    @property
-    def has_more(self) -> bool:
-        """Whether rows are there that were not sent; once the run is over no more come, also to a log that was cut off."""
-        return self.viewed is not None and self.sent < len(self.viewed.log.time)
-
-
-def extended(log: Log, block: Log) -> Log:
-    """`log` with the rows of the block that follows it."""
-    log.time = np.concatenate([log.time, block.time])
-    log.state = np.concatenate([log.state, block.state])
-    log.wind = np.concatenate([log.wind, block.wind])
-    log.loads = {name: np.concatenate([values, block.loads[name]]) for name, values in log.loads.items()}
-    for name in _STATUS:
-        setattr(log, name, np.concatenate([getattr(log, name), getattr(block, name)]))
-    return log
-
-
-class Bridge:
-    """One look at a time at the run folder, and what is new of it to the viewer."""
-
-    def __init__(self, told: Watched, recording: Any) -> None:
-        from fatigue_runner.viewer import blueprint
-
-        self.told, self.recording, self._blueprint = told, recording, blueprint
-        self.folder = Path(told.folder)
-        self.overview = Overview(self.folder, told.total, told.jobs, told.workers)
-        first = next((name for job in told.jobs for name in job), None)
-        known = {name for job in told.jobs for name in job}
-        logged = self._log_of(told.case) if told.case else None
-        name = told.case if told.case in known or (logged and logged.exists()) else first
-        self.player = Player(self._log_of(name), told.pace) if name else None
-        self.stage: Any = None
-        self._drawn = 0.0
-
-    def _log_of(self, name: str) -> Path:
-        return self.folder / "logs" / f"{name}.mcap"
-
-    def step(self, now: float, over: bool) -> bool:
-        """Send what is new; False when there is nothing left to come."""
-        if over or now - self._drawn > OVERVIEW_SECONDS:
-            if self.overview.update() or not self._drawn:
-                self._draw()
-            self._drawn = now
-        if self.player is not None:
-            self._play(self.player, now)
-        return not over or (self.player is not None and self.player.has_more)
-
-    def _draw(self) -> None:
-        import rerun as rr
-
-        text = self.overview.text()
-        self.recording.log(
-            "campaign/cases", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True
-        )
-        drawing = chart(self.overview)
-        if drawing is None:
-            return
-        axes = rr.LineStrips2D([line.tolist() for line in drawing.lines], colors=[(90, 100, 115)], radii=0.15)
-        self.recording.log("campaign/chart/axes", axes, static=True)
-        places, names = [label[:2] for label in drawing.labels], [label[2] for label in drawing.labels]
-        self.recording.log(
-            "campaign/chart/labels",
-            rr.Points2D(places, labels=names, radii=0.01, colors=[(200, 205, 212)], show_labels=True),
-            static=True,
-        )
-        for place, (name, (points, colour)) in enumerate(drawing.series.items()):
-            # good integrators lie on each other: smaller dots on larger ones show that all are there
-            size = 3.2 - 1.8 * place / max(len(drawing.series) - 1, 1)
-            dots = rr.Points2D(
-                points,
-                colors=[colour],
-                radii=size,
-                labels=[name] * len(points),
-                show_labels=False,
-                draw_order=40.0 + place,
-            )
-            self.recording.log(f"campaign/chart/series/{place}", dots, static=True)
-            spot = [20.0 + 60.0 * (place % 3), CHART[1] + 22.0 + 8.0 * (place // 3)]
-            key = rr.Points2D([spot], colors=[colour], radii=0.01, labels=[name], show_labels=True)
-            self.recording.log(f"campaign/chart/key/{place}", key, static=True)
-
-    def _play(self, player: Player, now: float) -> None:
-        from fatigue_runner.viewer.recording import Stage
-
+    def _lines(self) -> int:
         try:
-            begins = player.read(now)
-        except FatigueRunnerError:  # a log that was damaged or begun anew: what is shown stays
-            player.ended = True
-            return
-        if player.viewed is None:
-            return
-        if begins:
-            self.stage = Stage(self.recording, [player.viewed], self.told.scale)
-            self.stage.set_up()
-            self.recording.send_blueprint(
-                self._blueprint.live_screen([player.viewed], player.pace is not None)
-            )
-        due = player.due(now)
-        if due > player.sent:
-            self.stage.send(player.viewed, player.sent, due)
-            player.sent = due
+            return self._records.read_bytes().count(b"\n")
+        except OSError:
+            return 0
 
 
-def main(path: str) -> None:
-    """Run the bridge as `path` (JSON of `Watched`) says."""
-    told = Watched(**json.loads(Path(path).read_text(encoding="utf-8")))
-    Path(path).unlink(missing_ok=True)
-    _yield_to_others()
-    heartbeat(START_SECONDS)
-    port = told.port or window.free_port()
-    # Inherits the low priority: the run comes first, and on a machine with time to spare it makes no difference.
-    process = None if told.port else window.start_viewer("--port", str(port))
-    if not _answers(port, process):
+def cores() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def main(look: Look, handle: int) -> None:
+    """Watch as `look` says what stands in the file `handle`."""
+    yield_to_others()
+    ear = Ear()
+    while not ear.told and not ear.gone:
+        ear.wait(60.0)
+    if not ear.told:  # the campaign was refused: there is nothing to look at
         return
+    with os.fdopen(handle, encoding="utf-8") as file:
+        file.seek(0)
+        told = Watched(**json.load(file))
+    room = Room(told, time.monotonic())
+    while not look.at_once and not room.is_there(time.monotonic(), ear.over):
+        ear.wait(0.5)
+    heartbeat(START_SECONDS)
+    port = look.port or window.free_port()
+    process = None if look.port else _open_viewer(port, look.viewer)
     import rerun as rr
 
     from fatigue_runner.viewer.blueprint import live_screen
+    from fatigue_runner.viewer.relay import Relay
 
+    if not _answers(port, process, ear):
+        return
     recording = rr.RecordingStream("fatigue-runner-live")
     recording.connect_grpc(
         f"rerun+http://{window.HOST}:{port}/proxy", default_blueprint=live_screen([], False)
     )
-    bridge = Bridge(told, recording)
-    over, looked = False, time.monotonic()
+    relay = Relay(told, look, recording, lambda: heartbeat(look.stall), room.spare)
+    looked = time.monotonic()
     while True:
-        heartbeat(told.stall)
+        heartbeat(look.stall)
         now = time.monotonic()
-        over = over or run_is_over()
-        if not bridge.step(now, over):
+        ear.listen()
+        if not relay.step(now, ear.over):
             break
         if now - looked > 1.0:
             looked = now
             if not listens(port):
                 return
-        time.sleep(LOOK_SECONDS)
-    recording.flush(timeout_sec=told.stall / 2)
+        time.sleep(LOOK_SECONDS if ear.over or room.spare or look.pace else 4 * LOOK_SECONDS)
+    recording.flush(timeout_sec=look.stall / 2)
+
+
+def _open_viewer(port: int, arguments: list[str]) -> Any:
+    """A viewer that gives way to the run as this process does: what it starts inherits that."""
+    return window.start_viewer("--port", str(port), *arguments, own_session=False)
 
 
 def heartbeat(seconds: float) -> None:
@@ -226,12 +146,6 @@ def heartbeat(seconds: float) -> None:
 _NOWHERE = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
 
 
-def run_is_over() -> bool:
-    """Whether the run has closed its end of our standard input, or is gone."""
-    ready, _, _ = select.select([sys.stdin], [], [], 0.0)
-    return bool(ready) and not os.read(sys.stdin.fileno(), 1024)
-
-
 def listens(port: int) -> bool:
     """Whether somebody listens on a port of this machine."""
     try:
@@ -241,27 +155,22 @@ def listens(port: int) -> bool:
         return False
 
 
-def _answers(port: int, process: Any) -> bool:
-    """Wait for the viewer; False where there is none to wait for."""
-    until = time.monotonic() + CONNECT_SECONDS
+def _answers(port: int, process: Any, ear: Ear) -> bool:
+    """Wait for the viewer; False where there is none to wait for. One that we opened comes, however late."""
+    until = time.monotonic() + (CONNECT_SECONDS if process is None else START_SECONDS)
     while time.monotonic() < until:
         if listens(port):
             return True
-        if run_is_over() or (process is not None and process.poll() is not None):
+        ear.listen()
+        if (ear.over or ear.gone) if process is None else process.poll() is not None:
             return False
         time.sleep(0.1)
     return False
 
 
-def _yield_to_others() -> None:
-    """The lowest ordinary priority: beside a busy worker it is 1.5 % of a core, on a machine with time to spare all it needs."""
-    with contextlib.suppress(OSError, AttributeError):
-        os.nice(19)
-
-
 if __name__ == "__main__":
     try:
-        main(sys.argv[1])
+        main(Look(**json.loads(sys.argv[1])), int(sys.argv[2]))
     finally:
         # Rerun waits for the viewer when the interpreter ends in the usual way.
         os._exit(0)

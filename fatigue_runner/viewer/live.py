@@ -1,40 +1,87 @@
 """Watching a campaign while it runs: starts and ends the process that does it, so that nothing of it can touch the run.
 
 The run writes its logs and records as it always does. A separate process (`bridge`) reads them and talks to the viewer; of it the
-run knows a process id and one end of a pipe that is closed when the run is over. Workers never see any of this.
+run knows a process id and one end of a pipe that is closed when the program is over. Workers never see any of this.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
-import os
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.viewer.window import require_display, require_rerun
 
 
 @dataclass
-class Watched:
-    """What the bridge is told. jobs: case ids in the order in which their blocks are started, `workers` at a time."""
+class Look:
+    """How to watch; the bridge has it from its start. viewer: arguments of the
+    viewer's program, where it opens one."""
 
-    folder: str
-    total: int
-    jobs: list[list[str]]
-    workers: int
     pace: float | None = None
     case: str | None = None
     scale: float = 1.0
     port: int | None = None
     stall: float = 30.0  # s without an answer of the viewer after which the bridge ends
+    viewer: list[str] = field(default_factory=list)
+    at_once: bool = False  # open the viewer at once, also where that slows the run
+
+
+@dataclass
+class Watched:
+    """What to watch; told when it begins. jobs: case ids in the order in which their blocks are started, `workers` at a time."""
+
+    folder: str
+    total: int
+    jobs: list[list[str]]
+    workers: int
+
+
+class Watcher:
+    """What `run_campaign` takes as `watch`; as a context, it lets the bridge know when the program is over."""
+
+    def __init__(self, look: Look, say: Callable[[str], Any] = lambda text: None) -> None:
+        self._look, self._say = look, say
+        self.bridge: BridgeProcess | None = None
+        try:
+            self.bridge = BridgeProcess(look)
+        except OSError as error:  # no memory, no process: the run is worth more than its picture
+            say(f"live view: it could not be started ({error.strerror}); the run goes on")
+
+    @contextmanager
+    def __call__(
+        self, folder: Path, total: int, jobs: Sequence[Sequence[str]], workers: int
+    ) -> Iterator[None]:
+        """(run folder, cases in all, ids of the cases of each job, workers) -> the context in which the cases run."""
+        ids, case = [name for job in jobs for name in job], self._look.case
+        if case is not None and ids and case not in ids and not (folder / "logs" / f"{case}.mcap").exists():
+            self._say(f"live view: no case {case!r} in this campaign; showing {ids[0]}")
+        if self.bridge is None:
+            yield
+            return
+        self.bridge.tell(Watched(str(folder.resolve()), total, [list(job) for job in jobs], workers))
+        try:
+            yield
+        finally:
+            self.bridge.over()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.bridge is not None:
+            self.bridge.close()
 
 
 def watcher(
@@ -44,8 +91,8 @@ def watcher(
     scale: float = 1.0,
     port: int | None = None,
     say: Callable[[str], Any] = lambda text: None,
-) -> Callable[[Path, int, Sequence[Sequence[str]], int], Any]:
-    """What `run_campaign` takes as `watch`: (run folder, cases in all, ids of the cases of each job, workers) -> context.
+) -> Watcher:
+    """Start watching: the viewer opens while the campaign is read, and shows the cases that run inside `watch(...)`.
 
     pace: play the case at this multiple of real time, also beyond the end of the run; default: show it as soon as it is there.
     case: id of the case to show, default the first of the first job. port: of a viewer on this machine that is already
@@ -56,42 +103,48 @@ def watcher(
     require_rerun()
     if port is None:
         require_display()
+    return Watcher(Look(pace, case, scale, port), say)
 
-    @contextmanager
-    def watch(folder: Path, total: int, jobs: Sequence[Sequence[str]], workers: int) -> Iterator[None]:
-        ids = [name for job in jobs for name in job]
-        if case is not None and ids and case not in ids and not (folder / "logs" / f"{case}.mcap").exists():
-            say(f"live view: no case {case!r} in this campaign; showing {ids[0]}")
-        told = Watched(
-            str(folder.resolve()), total, [list(job) for job in jobs], workers, pace, case, scale, port
+
+class BridgeProcess:
+    """The bridge as the run sees it. Nothing here waits for it: what is said fits into the pipe, whether it is read or not."""
+
+    def __init__(self, look: Look) -> None:
+        # Anonymous: it is gone with its last reader, however that ends.
+        self._told = tempfile.TemporaryFile("w", encoding="utf-8")  # noqa: SIM115
+        handle = self._told.fileno()
+        # In the run's session, or the two would have equal rights on the cores (see `priority`), but out of reach of a Ctrl-C:
+        # that is for the run, which then tells the bridge.
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "fatigue_runner.viewer.bridge", json.dumps(asdict(look)), str(handle)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            process_group=0,
+            pass_fds=(handle,),
         )
-        bridge = start(told)
-        try:
-            yield
-        finally:
-            finish(bridge)
 
-    return watch
+    def tell(self, watched: Watched) -> None:
+        """What is to be watched, from now on."""
+        with contextlib.suppress(OSError, ValueError):
+            json.dump(asdict(watched), self._told)
+            self._told.flush()
+        self._say(b"t")
 
+    def over(self) -> None:
+        """The cases have run: no more will come. The bridge sends or plays the rest, and ends by itself with that, with the
+        viewer, or when the viewer does not answer."""
+        self._say(b"o")
 
-def start(told: Watched) -> subprocess.Popen[bytes]:
-    """Start the bridge; its life does not depend on this process, except that it ends soon after it."""
-    handle, name = tempfile.mkstemp(prefix="fatigue-runner-live-", suffix=".json")
-    with os.fdopen(handle, "w", encoding="utf-8") as file:
-        json.dump(asdict(told), file)
-    # A session of its own: Ctrl-C is for the run, which then tells the bridge.
-    return subprocess.Popen(
-        [sys.executable, "-m", "fatigue_runner.viewer.bridge", name],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+    def close(self) -> None:
+        """The program is over, too."""
+        self._told.close()
+        if self.process.stdin is not None:
+            with contextlib.suppress(OSError):
+                self.process.stdin.close()
 
-
-def finish(bridge: subprocess.Popen[bytes]) -> None:
-    """Tell the bridge that the run is over, and wait for nothing: it sends or plays the rest, and ends by itself with that,
-    with the viewer, or when the viewer does not answer."""
-    if bridge.stdin is not None:
-        with contextlib.suppress(OSError):
-            bridge.stdin.close()
+    def _say(self, word: bytes) -> None:
+        if self.process.stdin is not None and not self.process.stdin.closed:
+            with contextlib.suppress(OSError):  # it is gone, with its viewer or without
+                self.process.stdin.write(word)
+                self.process.stdin.flush()

@@ -30,10 +30,17 @@ _WHITE, _GREY, _BLUE = (232, 236, 240), (150, 158, 168), (92, 104, 122)
 
 
 class Stage:
-    """Cases on a recording. scale: times true deflection. Ranges of colours are those of all cases together."""
+    """Cases on a recording. scale: times true deflection; series_rate [Hz]: of simulated time, at most so many points per
+    series, None for all. Ranges of colours are those of all cases together."""
 
-    def __init__(self, recording: rr.RecordingStream, cases: Sequence[Viewed], scale: float = 1.0) -> None:
-        self.recording, self.cases, self.scale = recording, cases, scale
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        cases: Sequence[Viewed],
+        scale: float = 1.0,
+        series_rate: float | None = None,
+    ) -> None:
+        self.recording, self.cases, self.scale, self.series_rate = recording, cases, scale, series_rate
         self.flap_range = _range([_flap(case) for case in cases])
         self.wind_range = _range([_disc_wind(case, slice(None)) for case in cases])
 
@@ -139,10 +146,7 @@ class Stage:
 
     def _frames(self, case: Viewed, rows: slice, rate: float, most: int) -> np.ndarray:
         """Rows of the slice that are frames of a slower clock: the same ones however the log is cut into blocks."""
-        count = len(case.log.time)
-        stride = max(1, int(np.ceil(count / most)))
-        if count > 1:
-            stride = max(stride, round((count - 1) / (case.log.duration * rate)) if case.log.duration else 1)
+        stride = max(_stride(case, rate), int(np.ceil(len(case.log.time) / most)))
         index = np.arange(rows.start, rows.stop)
         return index[index % stride == 0]
 
@@ -202,49 +206,52 @@ class Stage:
         self._columns(path, time, surface, tint)
 
     def _send_series(self, case: Viewed, rows: slice) -> None:
-        log = case.log
-        time = log.time[rows]
+        log, stride = case.log, _stride(case, self.series_rate)
+        index = np.arange(rows.start, rows.stop)
+        index = index[index % stride == 0]
+        time = log.time[index]
         for place, channel in enumerate(channels.STATES):
             self._series(
-                f"plots/state/{channel.name}/{case.key}", time, log.state[rows, place] * channel.scale
+                f"plots/state/{channel.name}/{case.key}", time, log.state[index, place] * channel.scale
             )
         if len(log.wind):
             for place, channel in enumerate(channels.WIND_SIGNALS):
-                self._series(f"plots/wind/{channel.name}/{case.key}", time, log.wind[rows, place])
+                self._series(f"plots/wind/{channel.name}/{case.key}", time, log.wind[index, place])
         for name, values in log.loads.items():
-            self._series(f"plots/load/{name}/{case.key}", time, values[rows] * read_unit(name)[1])
-        self._send_solver(case, rows)
+            self._series(f"plots/load/{name}/{case.key}", time, values[index] * read_unit(name)[1])
+        self._send_solver(case, rows, stride)
 
-    def _send_solver(self, case: Viewed, rows: slice) -> None:
-        """What belongs to the interval that ends at a row; errors and norms by their logarithm, as they spread over decades."""
+    def _send_solver(self, case: Viewed, rows: slice, stride: int) -> None:
+        """What belongs to the interval that ends at a row; errors and norms by their logarithm, as they spread over decades.
+        Of a group of `stride` intervals the largest value stands for all."""
         log = case.log
         first = max(rows.start, 1)
         within = slice(first - 1, rows.stop - 1)
-        time = log.time[first : rows.stop]
+        if within.stop <= within.start:
+            return
+        starts = _starts(within, stride)
+        time = log.time[first : rows.stop][starts]
         for name in SOLVER_SERIES:
             values = getattr(log, name)[within]
-            if not len(values) or not np.isfinite(values).any():
+            if len(values) != within.stop - within.start or not np.isfinite(values).any():
                 continue
+            values = np.fmax.reduceat(values, starts)
             known = np.isfinite(values) & (values > 0)
-            self._series(
-                f"plots/solver/{name}/{case.key}", time[: len(values)][known], np.log10(values[known])
-            )
-        accepted = log.accepted[within]
-        if case.is_guarded and len(accepted):
-            self._send_band(case, within, time, accepted)
+            self._series(f"plots/solver/{name}/{case.key}", time[known], np.log10(values[known]))
+        if case.is_guarded and len(log.accepted):
+            self._send_band(case, within)
 
-    def _send_band(self, case: Viewed, within: slice, time: np.ndarray, accepted: np.ndarray) -> None:
+    def _send_band(self, case: Viewed, within: slice) -> None:
         """One mark per group of steps, red when any of them fell back."""
-        size = max(1, int(np.ceil(len(case.log.accepted) / BAND_POINTS)))
-        groups = np.arange(within.start, within.stop) // size
-        starts = np.flatnonzero(np.r_[True, np.diff(groups) > 0])
-        good = np.minimum.reduceat(accepted[: len(groups)].astype(np.uint8), starts)
+        starts = _starts(within, max(1, int(np.ceil(len(case.log.accepted) / BAND_POINTS))))
+        time = case.log.time[within.start + 1 : within.stop + 1][starts]
+        good = np.minimum.reduceat(case.log.accepted[within].astype(np.uint8), starts)
         shade = np.where(good[:, None] > 0, [*colours.ACCEPTED, 255], [*colours.REJECTED, 255]).astype(
             np.uint8
         )
         self._columns(
             f"plots/solver/accepted/{case.key}",
-            time[starts],
+            time,
             rr.Scalars.columns(scalars=good.astype(float)),
             rr.SeriesPoints.columns(colors=colours.packed(shade)),
         )
@@ -257,6 +264,19 @@ class Stage:
 def nanoseconds(time: np.ndarray) -> np.ndarray:
     """Times [s] as timedelta64[ns]."""
     return np.round(np.asarray(time) * 1e9).astype("timedelta64[ns]")
+
+
+def _stride(case: Viewed, rate: float | None) -> int:
+    """Every how many rows a clock of this rate [Hz] ticks."""
+    if not rate or len(case.log.time) < 2 or not case.log.duration:
+        return 1
+    return max(1, round((len(case.log.time) - 1) / (case.log.duration * rate)))
+
+
+def _starts(within: slice, size: int) -> np.ndarray:
+    """Where groups of so many intervals begin in a slice: the same groups however the log is cut into blocks."""
+    groups = np.arange(within.start, within.stop) // size
+    return np.flatnonzero(np.r_[True, np.diff(groups) > 0])
 
 
 def _flap(case: Viewed) -> np.ndarray:

@@ -7,7 +7,6 @@ import socket
 import subprocess
 import sys
 import tempfile
-import urllib.request
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -119,15 +118,18 @@ def viewer(*arguments: str | Path, windowed: bool = True) -> Iterator[subprocess
         end(process)
 
 
-def start_viewer(*arguments: str | Path) -> subprocess.Popen[bytes]:
-    """Start the viewer's program itself: the `rerun` script is a wrapper, and stopping that leaves the viewer alone."""
+def start_viewer(*arguments: str | Path, own_session: bool = True) -> subprocess.Popen[bytes]:
+    """Start the viewer's program itself: the `rerun` script is a wrapper, and stopping that leaves the viewer alone.
+
+    own_session: keep it from the Ctrl-C of this terminal.
+    """
     command = [str(program()), "--bind", HOST, "--hide-welcome-screen", *map(str, arguments)]
     return subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        start_new_session=True,
+        start_new_session=own_session,
     )
 
 
@@ -158,6 +160,8 @@ def wait(process: subprocess.Popen[bytes]) -> None:
 
 
 def _wait_until_served(process: subprocess.Popen[bytes], port: int) -> None:
+    import urllib.request  # slow to load, and the process beside a run must not be
+
     deadline = monotonic() + _START_SECONDS
     while monotonic() < deadline:
         if process.poll() is not None:

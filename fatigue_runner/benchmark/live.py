@@ -1,0 +1,245 @@
+"""What it costs a campaign to be watched: the same campaign without and with `--live`, in turn, in one run.
+
+Both cores are busy all the time, which is the worst that can happen: what the bridge and the viewer take is taken from the workers.
+The bridge opens the viewer with the end of a campaign that is as short as this one; with `at_once` it opens it as soon as the cases
+run, as in a campaign of minutes, and what that costs in seconds is what such a campaign loses.
+
+In each round every situation runs once; ratios are to the mean of the two unwatched runs of the same round, and how far those two lie
+apart is what the machine's own unrest amounts to. Sharper than the clock: how long the run's processes were ready and waited for
+a core, which Linux counts.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import statistics
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from fatigue_runner.campaign import run_campaign
+from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.viewer import window
+from fatigue_runner.viewer.live import Look, Watcher
+from fatigue_runner.viewer.priority import yield_to_others
+
+TARGET = 1.02
+ALONE = "not watched"
+AGAIN = "not watched, again"
+SITUATIONS = (ALONE, AGAIN, "viewer open", "viewer absent", "viewer stopped", "viewer killed")
+# What is done to the viewer while the campaign runs.
+_SIGNALS = {"viewer stopped": "SIGSTOP", "viewer killed": "SIGKILL"}
+_START_SECONDS = 30.0
+
+
+def campaign(duration: float, workers: int) -> dict[str, Any]:
+    """Turbulent winds with three integrators and their reference: as a design load case, but shorter."""
+    return {
+        "name": "live-benchmark",
+        "turbine": "nrel5mw",
+        "duration": duration,
+        "workers": workers,
+        "wind": {
+            "type": "turbulent",
+            "speeds": {"start": 6, "stop": 11, "count": 16},
+            "intensity": 0.14,
+            "seeds": workers,
+        },
+        "integrators": [{"method": "heun", "step": [0.01, 0.02]}, {"method": "rk4", "step": 0.02}],
+        "reference": {"method": "rk7", "step": 0.005},
+    }
+
+
+def viewer_arguments() -> list[str]:
+    """Of the viewer that is opened here: a window where there is a display, else one that draws without, else a server."""
+    if os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        return []
+    with window.viewer("--headless", "--port", str(window.free_port())) as process:
+        time.sleep(3.0)
+        return ["--headless"] if process.poll() is None else ["--serve-grpc"]
+
+
+def measure(
+    rounds: int = 5,
+    duration: float = 120.0,
+    workers: int | None = None,
+    at_once: bool = False,
+    say: Callable[[str], Any] = lambda text: None,
+) -> dict[str, Any]:
+    """Wall time of the campaign in every situation of `SITUATIONS`, in turn.
+
+    duration [s]: simulated, per case; workers: processes, default as many as cores. Returns {"target", "cores", "workers",
+    "rounds", "at_once", "rerun", "viewer", "met", "situations": {name: {"seconds", "ratio", "lowest", "highest", "waited",
+    "cpu_share"}}}:
+    ratio, waited [s] and cpu_share are medians over the rounds; cpu_share is what bridge and viewer took of all cores.
+    Raises InputError where Rerun is not installed.
+    """
+    window.require_rerun()
+    cores = os.cpu_count() or 1
+    workers = workers or cores
+    spec, viewer = campaign(duration, workers), viewer_arguments()
+    say("warming up")
+    warm = _run(spec, ALONE, Look(), 0.0).wall  # compiles and loads kernels, starts the workers
+    alone = _run(spec, ALONE, Look(), 0.0).wall
+    say(f"{warm:.1f} s cold, {alone:.1f} s warm; {rounds} rounds of {len(SITUATIONS)} runs")
+    runs: dict[str, list[_Run]] = {name: [] for name in SITUATIONS}
+    for number in range(rounds):
+        turn = number % len(SITUATIONS)
+        for name in (*SITUATIONS[turn:], *SITUATIONS[:turn]):
+            runs[name].append(_run(spec, name, Look(viewer=viewer, at_once=at_once), alone / 3))
+        say(f"round {number + 1}: " + ", ".join(f"{name} {runs[name][-1].wall:.2f} s" for name in SITUATIONS))
+    base = [(a.wall + b.wall) / 2 for a, b in zip(runs[ALONE], runs[AGAIN], strict=True)]
+    situations = {name: _figures(found, base, cores) for name, found in runs.items()}
+    watched = [figures["ratio"] for name, figures in situations.items() if name.startswith("viewer")]
+    return {
+        "target": TARGET,
+        "cores": cores,
+        "workers": workers,
+        "rounds": rounds,
+        "at_once": at_once,
+        "rerun": version("rerun-sdk"),
+        "viewer": {"--headless": "drawing, without a screen", "--serve-grpc": "server only"}.get(
+            "".join(viewer), "window"
+        ),
+        "met": max(watched) <= TARGET,
+        "situations": situations,
+    }
+
+
+@dataclass
+class _Run:
+    """Wall time, CPU time of bridge and viewer within it, time for which the run's processes waited for a core [s]."""
+
+    wall: float
+    watching: float
+    waited: float
+
+
+def _figures(runs: list[_Run], base: list[float], cores: int) -> dict[str, Any]:
+    ratios = [run.wall / alone for run, alone in zip(runs, base, strict=True)]
+    return {
+        "seconds": [run.wall for run in runs],
+        "ratio": statistics.median(ratios),
+        "lowest": min(ratios),
+        "highest": max(ratios),
+        "waited": statistics.median(run.waited for run in runs),
+        "cpu_share": statistics.median(run.watching / (run.wall * cores) for run in runs),
+    }
+
+
+def _run(spec: dict[str, Any], name: str, look: Look, after: float) -> _Run:
+    """One run in one situation; after [s]: when something happens to the viewer."""
+    with tempfile.TemporaryDirectory() as folder, _situation(name, look.viewer, after) as (port, groups):
+        waited, begin = _waited_of_group(os.getpgid(0)), time.perf_counter()
+        watcher = None
+        if name.startswith("viewer"):
+            watcher = Watcher(replace(look, port=port))
+            if watcher.bridge is not None:
+                groups.append(watcher.bridge.process.pid)
+        before = sum(map(_cpu_of_group, groups))
+        results = run_campaign(spec, Path(folder) / "run", watch=watcher)
+        wall = time.perf_counter() - begin
+        used = sum(map(_cpu_of_group, groups)) - before
+        waited = _waited_of_group(os.getpgid(0)) - waited
+        if watcher is not None and watcher.bridge is not None:
+            watcher.__exit__(None, None, None)
+            _end_group(watcher.bridge.process)
+        if results.exit_code:
+            raise FatigueRunnerError("the campaign of this benchmark did not run to its end")
+        return _Run(wall, max(used, 0.0), waited)
+
+
+@contextmanager
+def _situation(name: str, viewer: list[str], after: float) -> Iterator[tuple[int | None, list[int]]]:
+    """(port of the viewer, None for one that the bridge opens; process groups that watch)."""
+    if name not in _SIGNALS:
+        yield (window.free_port() if name == "viewer absent" else None), []
+        return
+    port = window.free_port()
+    with window.viewer(*viewer, "--port", str(port)) as process:
+        yield_to_others(process.pid)
+        _wait_for(port)
+        # a viewer of the user's own that begins to stand still, or is gone, in the middle of the run
+        timer = threading.Timer(after, process.send_signal, [getattr(signal, _SIGNALS[name])])
+        timer.start()
+        try:
+            yield port, [process.pid]
+        finally:
+            timer.cancel()
+            with contextlib.suppress(OSError):
+                process.kill()  # which also ends one that was stopped
+
+
+def _wait_for(port: int) -> None:
+    import socket
+
+    until = time.monotonic() + _START_SECONDS
+    while time.monotonic() < until:
+        with contextlib.suppress(OSError), socket.create_connection((window.HOST, port), timeout=1.0):
+            return
+        time.sleep(0.05)
+    raise FatigueRunnerError("the viewer does not start here; see `fatigue-runner view`")
+
+
+def _end_group(process: Any) -> None:
+    """End the bridge and the viewer that it opened."""
+    with contextlib.suppress(OSError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _processes(group: int) -> Iterator[tuple[Path, list[str]]]:
+    """Folder and status fields of every living process of a group; nothing where the system has no /proc."""
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = stat.read_text().rpartition(")")[2].split()
+            if int(fields[2]) == group:
+                yield stat.parent, fields
+
+
+def _cpu_of_group(group: int) -> float:
+    """CPU time of a group's processes [s]."""
+    ticks = sum(int(fields[11]) + int(fields[12]) for _, fields in _processes(group))
+    return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def _waited_of_group(group: int) -> float:
+    """Time for which the threads of a group's processes were ready to run and waited for a core [s]."""
+    total = 0
+    for folder, _ in _processes(group):
+        with contextlib.suppress(OSError):
+            total += sum(int(path.read_text().split()[1]) for path in folder.glob("task/*/schedstat"))
+    return total / 1e9
+
+
+def table(result: dict[str, Any]) -> Any:
+    """The figures of `measure` as a rich table."""
+    from rich.table import Table
+
+    made = Table(
+        title=f"A watched campaign: {result['workers']} workers on {result['cores']} cores, {result['rounds']} rounds, "
+        f"Rerun {result['rerun']} ({result['viewer']})"
+    )
+    for heading in ("", "wall time, s", "ratio", "lowest", "highest", "waited, s", "watching"):
+        made.add_column(heading, justify="right" if heading else "left")
+    for name, figures in result["situations"].items():
+        made.add_row(
+            name,
+            f"{statistics.median(figures['seconds']):.2f}",
+            *(f"{figures[key]:.3f}" for key in ("ratio", "lowest", "highest")),
+            f"{figures['waited']:.2f}",
+            f"{figures['cpu_share']:.2%}",
+        )
+    made.caption = (
+        f"ratio: to the unwatched runs of the same round, median; waited: for a core, all workers together; watching: CPU share "
+        f"of bridge and viewer. Target {result['target']:.2f}: " + ("met" if result["met"] else "missed")
+    )
+    return made
