@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from campaign_world import CAMPAIGN, build_world, write_campaign
+from ruamel.yaml import YAML
 
 from fatigue_runner.campaign import CampaignInterrupted, run_campaign
 from fatigue_runner.campaign.results import columns
@@ -98,6 +99,9 @@ def test_every_case_has_a_log_that_says_what_it_is_and_how_far_from_the_referenc
     assert log.run["turbine_hash"] == "0" * 64
     assert log.result["status"] == "done"
     assert b"name: toy" in log.attachments["campaign.yaml"]
+    turbine = log.attachments["turbine.yaml"].decode()
+    assert log.run["turbine_hash"] in turbine.splitlines()[0]
+    assert {"geometry", "blade", "tower", "generator"} <= set(YAML(typ="safe", pure=True).load(turbine))
     assert len(log.time) == 501
     assert log.reference_error.max() == pytest.approx(0.01 / 2, rel=0.01)
 

@@ -66,6 +66,21 @@ def test_turbine_is_the_one_that_the_attached_campaign_names(tmp_path):
     assert cases.read_cases([path])[0].geometry.cone == 0.0
 
 
+def test_attached_turbine_is_drawn_also_where_its_file_is_gone_or_has_changed(tmp_path):
+    path = tmp_path / "case.mcap"
+    text = (Path(cases.__file__).parents[1] / "turbine" / "data" / "nrel5mw.yaml").read_text()
+    own = text.replace("precone_deg: -2.5", "precone_deg: -1.5")
+    assert own != text
+    attached = {"campaign.yaml": b"turbine: /gone/own.yaml\n", "turbine.yaml": own.encode()}
+    still = motion(5)
+    still.loads.clear()  # tip channels of another cone
+    write_log(path, still, {"turbine": "own"}, attached, {})
+    assert np.degrees(cases.read_cases([path])[0].geometry.cone) == pytest.approx(-1.5)
+    with pytest.raises(InputError, match=r"/gone/own.yaml does not exist"):
+        write_log(path, still, {"turbine": "own"}, {"campaign.yaml": attached["campaign.yaml"]}, {})
+        cases.read_cases([path])
+
+
 def test_cut_log_is_shown_up_to_where_it_is_good(tmp_path):
     whole = write(tmp_path, rows=4000)
     data = whole.read_bytes()

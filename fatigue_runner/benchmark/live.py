@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import random
 import signal
 import statistics
 import tempfile
@@ -92,8 +93,8 @@ def measure(
     say(f"{warm:.1f} s cold, {alone:.1f} s warm; {rounds} rounds of {len(SITUATIONS)} runs")
     runs: dict[str, list[_Run]] = {name: [] for name in SITUATIONS}
     for number in range(rounds):
-        turn = number % len(SITUATIONS)
-        for name in (*SITUATIONS[turn:], *SITUATIONS[:turn]):
+        # another order in each round: what ran just before must not always be the same
+        for name in random.Random(number).sample(SITUATIONS, len(SITUATIONS)):
             runs[name].append(_run(spec, name, Look(viewer=viewer, at_once=at_once), alone / 3))
         say(f"round {number + 1}: " + ", ".join(f"{name} {runs[name][-1].wall:.2f} s" for name in SITUATIONS))
     base = [(a.wall + b.wall) / 2 for a, b in zip(runs[ALONE], runs[AGAIN], strict=True)]

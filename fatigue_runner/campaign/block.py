@@ -188,6 +188,7 @@ def _finish(
         "case_id": case.id,
         "case_hash": case.hash,
         "wind": wind.name,
+        "corrector_hash": case.integration.digest or "",
         **{name: "" if row[name] is None else str(row[name]) for name in DESCRIPTION},
     }
     said = {"case_id", *DESCRIPTION}

@@ -94,8 +94,6 @@ def make_plan(
 
 def resolved_yaml(plan: Plan) -> str:
     """The campaign with every default written out, as YAML that can be run again from anywhere."""
-    from ruamel.yaml import YAML
-
     data = plan.campaign.model_dump(exclude={"wind", "integrators", "reference"})
     data["turbine"] = plan.turbine_source
     wind = plan.campaign.wind.model_dump(exclude_unset=True, exclude_none=True)
@@ -104,8 +102,24 @@ def resolved_yaml(plan: Plan) -> str:
     data["wind"] = _without_none({"type": plan.campaign.wind.type, **wind})
     data["integrators"] = [_resolved_integrator(item, plan) for item in plan.campaign.integrators]
     data["reference"] = None if plan.campaign.reference is None else plan.campaign.reference.model_dump()
+    return _yaml("The campaign of this run folder, with every default written out.", data)
+
+
+def turbine_yaml(plan: Plan) -> str:
+    """The turbine's file with what it is based on; of its aerodynamic tables the name only, their content is in the hash."""
+    from fatigue_runner.turbine.parameters import read_turbine_file
+
+    data = read_turbine_file(plan.turbine_source)
+    aero = data.get("aerodynamics", {})
+    data["aerodynamics"] = aero | {key: Path(aero[key]).name for key in ("tables", "airfoils") if key in aero}
+    return _yaml(f"The turbine of this run, hash {plan.turbine.hash}.", data)
+
+
+def _yaml(heading: str, data: dict[str, Any]) -> str:
+    from ruamel.yaml import YAML
+
     text = io.StringIO()
-    text.write("# The campaign of this run folder, with every default written out.\n")
+    text.write(f"# {heading}\n")
     yaml: Any = YAML(typ="safe", pure=True)
     yaml.sort_base_mapping_type_on_output = False
     yaml.default_flow_style = None

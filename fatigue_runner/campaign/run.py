@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.campaign.about import about
 from fatigue_runner.campaign.block import Setup, run_block
-from fatigue_runner.campaign.plan import Plan, make_plan, resolved_yaml
+from fatigue_runner.campaign.plan import Plan, make_plan, resolved_yaml, turbine_yaml
 from fatigue_runner.campaign.pool import connect, run_jobs
 from fatigue_runner.campaign.results import Results, columns
 from fatigue_runner.campaign.store import Store
@@ -92,7 +92,7 @@ def _simulate(
         plan.turbine.hash,
         store.out.resolve() / "logs",
         facts,
-        {"campaign.yaml": text.encode()},
+        {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan).encode()},
     )
     store.open({"facts": facts, "campaign": plan.campaign.model_dump()}, text)
     try:

@@ -109,7 +109,7 @@ def as_viewed(logs: Sequence[tuple[Path, Log]], turbine: str | None = None) -> l
     viewed: list[Viewed] = []
     others = 0
     for place, (path, log) in enumerate(logs):
-        mapping = read_turbine_file(turbine or turbine_of(log))
+        mapping = read_turbine_file(turbine) if turbine else turbine_of(log)
         shape = geometry(mapping, radians(_number(log.run.get("pitch_deg"))))
         check_turbine(path, log, shape)
         reference = _is_reference(log)
@@ -143,18 +143,25 @@ def _readable(path: Path) -> Log:
     return log
 
 
-def turbine_of(log: Log) -> str:
-    """Name or file of the turbine that a log was made with."""
+def turbine_of(log: Log) -> dict[str, Any]:
+    """The turbine that a log was made with: the one attached to it, else the one that its campaign or its `run` names."""
+    attached = _mapping(log, "turbine.yaml")
+    if "blade" in attached and "tower" in attached:
+        return attached
+    source = _mapping(log, "campaign.yaml").get("turbine")
+    return read_turbine_file(str(source or log.run.get("turbine") or "nrel5mw"))
+
+
+def _mapping(log: Log, name: str) -> dict[str, Any]:
+    """An attached YAML file; empty where there is none."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import YAMLError
 
-    text = log.attachments.get("campaign.yaml", b"")
     try:
-        given: Any = YAML(typ="safe", pure=True).load(text.decode()) if text else None
+        given = YAML(typ="safe", pure=True).load(log.attachments.get(name, b"").decode())
     except (YAMLError, UnicodeDecodeError):
-        given = None
-    source = given.get("turbine") if isinstance(given, dict) else None
-    return str(source or log.run.get("turbine") or "nrel5mw")
+        return {}
+    return given if isinstance(given, dict) else {}
 
 
 def check_turbine(path: Path, log: Log, shape: Geometry) -> None:
