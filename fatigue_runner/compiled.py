@@ -21,7 +21,7 @@ from numba.core import config as numba_config
 # Without `reassoc`: with it LLVM sorts sums anew each time that it optimises a function, so that a kernel gives other bits when
 # it was compiled in this process than when it came from the cache, and a resumed campaign other bits than its first half.
 _FLAGS = {"nnan", "ninf", "nsz", "arcp", "contract", "afn"}
-FAST = {"fastmath": _FLAGS, "error_model": "numpy", "boundscheck": False, "nogil": True}
+FAST: dict[str, Any] = {"fastmath": _FLAGS, "error_model": "numpy", "boundscheck": False, "nogil": True}
 
 config: Any = numba_config  # its attributes are set at import, which no type checker sees
 

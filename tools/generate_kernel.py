@@ -24,7 +24,7 @@ LANES = 16
 
 
 class Printer(PythonCodePrinter):
-    """Python source that numba compiles well: products instead of powers."""
+    """Source that `lane_code` reads: products instead of powers, sums that become fused multiply-adds."""
 
     def _print_Pow(self, expr, rational=False):
         base, exponent = expr.as_base_exp()
@@ -34,7 +34,7 @@ class Printer(PythonCodePrinter):
         if exponent == -1:
             return f"(1.0/{self.parenthesize(base, 50)})"
         if exponent == sp.Rational(1, 2) and not base.is_number:
-            return f"math.sqrt({self._print(base)})"
+            return f"sqrt({self._print(base)})"
         return repr(float(expr))
 
     def _print_Rational(self, expr):
@@ -42,6 +42,25 @@ class Printer(PythonCodePrinter):
 
     def _print_Integer(self, expr):
         return f"{int(expr)}.0"
+
+    def _print_Add(self, expr, order=None):
+        """Single terms first: `a + b*c + d*e` is two fused multiply-adds, `b*c + d*e + a` one more instruction."""
+        terms = self._as_ordered_terms(expr, order=order)
+        plain = [t for t in terms if not (-t if t.could_extract_minus_sign() else t).is_Mul]
+        products = [t for t in terms if t not in plain]
+        negative = [t for t in plain if t.could_extract_minus_sign()]
+        positive = [t for t in plain if t not in negative] + [
+            t for t in products if not t.could_extract_minus_sign()
+        ]
+        rest = negative + [t for t in products if t.could_extract_minus_sign()]
+        first, others = (positive[0], positive[1:] + rest) if positive else (rest[0], rest[1:])
+        text = self.parenthesize(first, 40)
+        for t in others:
+            minus = t.could_extract_minus_sign()
+            text += (" - " if minus else " + ") + self.parenthesize(
+                -t if minus else t, 40 if not minus else 41
+            )
+        return text
 
 
 PRINT = Printer().doprint
@@ -79,35 +98,17 @@ def used_only(
     return kept[::-1]
 
 
+# sin and cos: remove whole turns, evaluate at a quarter of the rest, double the angle twice
 SINE_COSINE = """\
-            # sin and cos: remove whole turns, evaluate at a quarter of the rest, double the angle twice
-            turns = math.floor(phi * 0.15915494309189535 + 0.5)
-            quarter = (phi - turns * 6.283185307179586 - turns * 2.4492935982947064e-16) * 0.25
-            square = quarter * quarter
-            sine = quarter * ({sine})
-            cosine = {cosine}
-            double = 2.0 * sine * cosine
-            cosine = 1.0 - 2.0 * sine * sine
-            sin_phi = 2.0 * double * cosine
-            cos_phi = 1.0 - 2.0 * double * double
-"""
-
-LOOKUP = """\
-        # All tables of one cell lie side by side, so one look-up is SIMD across tables. The indices are unsigned: with signed
-        # ones numba's wrap-around for negative indices keeps LLVM from vectorising (measured: 52 instead of 5 ns a look-up).
-        for j in range(LANES):
-            place = (scratch[j] - tables[0]) * tables[1]
-            # the integer is clamped as well: a diverged lane's NaN must not become a wild index
-            cell = min(max(int(min(max(place, -1.0), 1.0e6)), 0), cells - 1)
-            inside = min(max(place - cell, 0.0), 1.0)
-            clamped[j] += 1 if place != cell + inside else 0
-            base = np.uint64(8 + cell * {stride})
-            to = np.uint64(j * {width})
-            for t in range(np.uint64({width})):
-                row[to + t] = (
-                    (tables[base + np.uint64({w3}) + t] * inside + tables[base + np.uint64({w2}) + t]) * inside
-                    + tables[base + np.uint64({width}) + t]
-                ) * inside + tables[base + t]
+turns = floor(phi * 0.15915494309189535 + 0.5)
+quarter = (phi - turns * 6.283185307179586 - turns * 2.4492935982947064e-16) * 0.25
+square = quarter * quarter
+sine = quarter * ({sine})
+cosine = {cosine}
+double = 2.0 * sine * cosine
+half = 1.0 - 2.0 * sine * sine
+sin_phi = 2.0 * double * half
+cos_phi = 1.0 - 2.0 * double * double
 """
 
 
@@ -119,80 +120,53 @@ def horner(first: int, terms: int) -> str:
     return text
 
 
-def body(lines, indent: str) -> list[str]:
-    return [f"{indent}{symbol} = {PRINT(expr)}" for symbol, expr in lines]
-
-
 def kernel(
     name: str, doc: str, sheet: eq.Sheet, outputs: dict[int, sp.Expr], extra_inputs, tables, constants
 ) -> str:
-    """One lane kernel: motion and tip-speed ratio, table look-up, the rest."""
+    """One lane kernel: its assignments in order, each value read from an array just before its first use."""
     wanted: set[sp.Symbol] = set().union(*(e.free_symbols for e in outputs.values()))
     lines = schedule(used_only(sheet.lines, wanted | {eq.TIP_SPEED_RATIO}), "u")
-    split = [s for s, _ in lines].index(eq.TIP_SPEED_RATIO)
-    first, second = lines[: split + 1], lines[split + 1 :]
-    later = set().union(*(e.free_symbols for _, e in second), *(e.free_symbols for e in outputs.values()))
-    trig = {eq.SINE, eq.COSINE}
-    carried = sorted((({s for s, _ in first} | trig) & later) - {eq.TIP_SPEED_RATIO}, key=str)
-    width = len(tables)
-    carry_row = 1
-    needed_constants = [
-        c
-        for c in constants
-        if c in set().union(*(e.free_symbols for _, e in lines), *(e.free_symbols for e in outputs.values()))
-    ]
-    places = {c: i for i, c in enumerate(constants)}
-    source = [
-        "@njit(**FAST)",
-        f"def {name}(x, wind, {''.join(f'{a}, ' for a in extra_inputs)}out, start, tables, cells, constants, "
-        "scratch, row, clamped):",
-        f'        """{doc}"""'.replace("        ", "    ", 1),
-    ]
-    source += [f"    {c} = constants[{places[c]}]" for c in needed_constants]
-
-    def loads(used):
-        rows = [f"            {s} = x[{i} * LANES + j]" for i, s in enumerate(eq.STATE) if s in used]
-        rows += [f"            {s} = wind[{i} * LANES + j]" for i, s in enumerate(eq.WIND) if s in used]
-        for array, symbols in extra_inputs.items():
-            rows += [
-                f"            {s} = {array}[{i} * LANES + j]" for i, s in enumerate(symbols) if s in used
-            ]
-        return rows
-
-    used_first = set().union(*(e.free_symbols for _, e in first)) | {eq.STATE[6]}
-    source += ["    for _once in range(1):", "        for j in range(LANES):", *loads(used_first)]
+    inputs = {s: f"x[{i}]" for i, s in enumerate(eq.STATE)} | {s: f"wind[{i}]" for i, s in enumerate(eq.WIND)}
+    for array, symbols in extra_inputs.items():
+        inputs |= {s: f"{array}[{i}]" for i, s in enumerate(symbols)}
+    inputs[eq.HALF_SQRT3] = repr(3**0.5 / 2)
+    inputs |= {c: f"constants[{i}]" for i, c in enumerate(constants)}
+    phi = eq.STATE[6]
+    source = [f"{phi} = {inputs.pop(phi)}"]
     source += SINE_COSINE.format(sine=horner(1, 9), cosine=horner(0, 10)).rstrip("\n").split("\n")
-    source += body(first, " " * 12)
-    source += [f"            scratch[j] = {eq.TIP_SPEED_RATIO}"]
-    source += [f"            scratch[{carry_row + i} * LANES + j] = {s}" for i, s in enumerate(carried)]
-    source += (
-        LOOKUP.format(width=width, stride=4 * width, w2=2 * width, w3=3 * width).rstrip("\n").split("\n")
-    )
-    source += ["        for j in range(LANES):", *loads(later)]
-    source += [
-        f"            {eq.TABLE[t]} = row[j * {width} + {i}]"
-        for i, t in enumerate(tables)
-        if eq.TABLE[t] in later
-    ]
-    source += [f"            {s} = scratch[{carry_row + i} * LANES + j]" for i, s in enumerate(carried)]
-    source += body(second, " " * 12)
-    source += [f"            out[start + {i} * LANES + j] = {PRINT(e)}" for i, e in outputs.items()]
-    text = "\n".join(source)
-    # the loop that runs once only served the templates' indentation
-    head, tail = text.split("    for _once in range(1):\n")
-    tail = "\n".join(line[4:] for line in tail.split("\n"))
-    ROWS[name] = carry_row + len(carried)
-    return head + tail + "\n"
 
+    def write(target: str, expr: sp.Expr) -> None:
+        for symbol in sorted(expr.free_symbols & inputs.keys(), key=str):
+            source.append(f"{symbol} = {inputs.pop(symbol)}")
+        source.append(f"{target} = {PRINT(expr)}")
 
-ROWS: dict[str, int] = {}
+    for symbol, expr in lines:
+        write(str(symbol), expr)
+    for i, expr in outputs.items():
+        write(f"out[{i}]", expr)
+    upper, width = f"{name.upper()}_CODE", len(tables)
+    arguments = "".join(f"{a}, " for a in ("x", "wind", *extra_inputs, "out"))
+    arrays = ", ".join(repr(a) for a in ("x", "wind", *extra_inputs, "out"))
+    return "\n".join([
+        f"{upper} = Code(place={str(eq.TIP_SPEED_RATIO)!r}, tables=TABLES[:{width}], width={-(-width // 8) * 8}, text=\"\"\"\\",
+        *source, '""")',
+        f"_{name}: Any = lane_kernel({upper}, ({arrays}), LANES)",
+        "", "",
+        "@njit(**FAST)",
+        f"def {name}({arguments}start, tables, cells, constants, scratch, row, clamped):",
+        f'    """{doc}"""',
+        f"    _{name}({arguments}start, tables, cells, constants, clamped)",
+        "",
+    ])  # fmt: skip
+
 
 HEADER = '''"""Generated by `python tools/generate_kernel.py` from fatigue_runner/turbine/equations.py; do not edit."""
 
-import math
+from typing import Any
 
 import numpy as np
 from fatigue_runner.compiled import FAST, njit
+from fatigue_runner.turbine.lane_code import Code, lane_kernel
 
 LANES = {lanes}
 
@@ -233,8 +207,7 @@ def generate() -> str:
     lines += ["    return np.array([", *(f"        {s}," for s in symbols), "    ], dtype=np.float64)"]
     header = HEADER.format(lanes=LANES, parameters=repr(tuple(eq.PARAMETERS)), tables=repr(eq.TABLES),
                            width=eq.TABLES_OF_THE_EQUATIONS, loads=repr(LOAD_NAMES))  # fmt: skip
-    rows = "\n".join(f"{name.upper()}_ROWS = {n}" for name, n in ROWS.items())
-    return header + "\n".join(lines) + "\n\n\n" + rows + "\n\n\n" + "\n\n".join(kernels)
+    return header + "\n".join(lines) + "\n\n\n" + "\n\n".join(kernels)
 
 
 def main() -> int:

@@ -25,11 +25,7 @@ def operations() -> int:
     from fatigue_runner.turbine.generated import kernel
 
     counter = _Operations()
-    tree = ast.parse(inspect.getsource(kernel))
-    function = next(n for n in tree.body if isinstance(n, ast.FunctionDef) and n.name == "rhs")
-    loops = [node for node in function.body if isinstance(node, ast.For)]
-    for loop in (loops[0], loops[-1]):
-        counter.visit(loop)
+    counter.visit(ast.parse(kernel.RHS_CODE.text))
     return counter.count + LOOKUP_OPERATIONS * kernel.EQUATION_TABLES
 
 
@@ -51,8 +47,8 @@ class _Operations(ast.NodeVisitor):
         self.generic_visit(node)
 
 
-def scalar_kernel() -> tuple[Callable[..., None], int]:
-    """The right-hand side of the same generated source, built for one lane; and the rows of scratch it needs."""
+def scalar_kernel() -> Callable[..., None]:
+    """The right-hand side of the same generated source, built for one lane; its look-up remains SIMD across tables."""
     from fatigue_runner.turbine.generated import kernel
 
     source = inspect.getsource(kernel).replace(f"LANES = {kernel.LANES}\n", "LANES = 1\n", 1)
@@ -62,7 +58,7 @@ def scalar_kernel() -> tuple[Callable[..., None], int]:
 
     space: dict[str, Any] = {"FAST": FAST, "__name__": "scalar_kernel"}
     exec(compile(source, "<scalar kernel>", "exec"), space)
-    return space["rhs"], space["RHS_ROWS"]
+    return space["rhs"]
 
 
 def _loop(rhs: Callable[..., None]) -> Callable[..., None]:
@@ -71,14 +67,13 @@ def _loop(rhs: Callable[..., None]) -> Callable[..., None]:
     @numba.njit(nogil=True)
     def run(repeats, x, wind, out, tables, cells, constants, scratch, row, clamped):
         for _ in range(repeats):
-            for group in range(x.shape[0]):
-                rhs(x[group], wind[group], out[group], 0, tables, cells, constants, scratch, row, clamped)
+            rhs(x, wind, out, 0, tables, cells, constants, scratch, row, clamped)
 
     return run
 
 
-def _work(run: Callable[..., None], turbine: Any, cases: int, lanes: int, rows: int) -> Callable[[], float]:
-    """A piece of work that returns nanoseconds per evaluation and case."""
+def _work(run: Callable[..., None], turbine: Any, cases: int, lanes: int) -> Callable[[], float]:
+    """A piece of work that returns nanoseconds per evaluation and case; one group after the other, as in a simulation."""
     from fatigue_runner.integrators.block import aligned
 
     data = turbine.kernel_data(0.0)
@@ -90,19 +85,18 @@ def _work(run: Callable[..., None], turbine: Any, cases: int, lanes: int, rows: 
     for i in range(groups * lanes):
         x[i // lanes, :, i % lanes] = points[i % 16]
         wind[i // lanes, 0, i % lanes] = speeds[i % 16]
-    flat, p = aligned(x.reshape(groups, -1)), aligned(wind.reshape(groups, -1))
-    out = aligned(np.zeros_like(flat))
-    scratch, row, clamped = (
-        aligned(np.zeros(rows * lanes)),
-        aligned(np.zeros(32 * lanes)),
-        np.zeros(lanes, np.int64),
-    )
-    tables = aligned(data.tables)
-    repeats = max(1, 4000 // groups // max(1, lanes // 2))
+    flat, p = x.reshape(groups, -1), wind.reshape(groups, -1)
+    arguments = [
+        (aligned(flat[g]), aligned(p[g]), aligned(np.zeros(16 * lanes)), aligned(data.tables), data.cells, aligned(data.constants),
+         np.zeros(1), np.zeros(1), np.zeros(lanes, np.int64))
+        for g in range(min(groups, 16))
+    ]  # fmt: skip
+    repeats = max(1, 16000 // groups // max(1, lanes // 2))
 
     def once() -> float:
         begin = time.thread_time()
-        run(repeats, flat, p, out, tables, data.cells, data.constants, scratch, row, clamped)
+        for group in range(groups):
+            run(repeats, *arguments[group % 16])
         return (time.thread_time() - begin) / repeats / cases * 1e9
 
     return once
@@ -172,10 +166,9 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     from fatigue_runner.turbine.generated import kernel
 
     turbine = load_turbine(turbine_name)
-    packed, (scalar, scalar_rows) = _loop(kernel.rhs), scalar_kernel()
-    scalar_loop = _loop(scalar)
-    work = {f"packed {n}": _work(packed, turbine, n, kernel.LANES, kernel.RHS_ROWS) for n in CASES}
-    work |= {f"scalar {n}": _work(scalar_loop, turbine, n, 1, scalar_rows) for n in CASES}
+    packed, scalar = _loop(kernel.rhs), _loop(scalar_kernel())
+    work = {f"packed {n}": _work(packed, turbine, n, kernel.LANES) for n in CASES}
+    work |= {f"scalar {n}": _work(scalar, turbine, n, 1) for n in CASES}
     work |= {f"step {name}": _step_work(turbine, name) for name in STEP_METHODS}
     work["peak"] = peak()
     with machine.pinned():

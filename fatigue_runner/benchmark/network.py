@@ -55,7 +55,7 @@ def measure(repeats: int = 9) -> dict[str, Any]:
         for n in SAMPLES
     }
     packed = kernel_benchmark._loop(kernel.rhs)
-    work["f"] = kernel_benchmark._work(packed, turbine, 256, kernel.LANES, kernel.RHS_ROWS)
+    work["f"] = kernel_benchmark._work(packed, turbine, 256, kernel.LANES)
     with machine.pinned():
         found = machine.interleaved(work, repeats)
     f = found["f"]["median"]

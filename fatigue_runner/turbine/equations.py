@@ -135,7 +135,9 @@ TABLES = (
 )  # fmt: skip
 TABLES_OF_THE_EQUATIONS = 32
 
-HALF_SQRT3 = sp.sqrt(3) / 2
+HALF_SQRT3 = sp.Symbol(
+    "half_sqrt3", real=True
+)  # sin 120 degrees; a symbol, so that it stays one number in the code
 BLADE_AZIMUTH = (
     (sp.Integer(1), sp.Integer(0)),
     (-sp.Rational(1, 2), HALF_SQRT3),
@@ -159,21 +161,50 @@ class Sheet:
         expr = sp.sympify(expr)
         if expr.is_number or expr in P.values():
             return expr
+        if expr.could_extract_minus_sign():
+            return -self.constant(-expr)
         if expr not in self._known:
-            self._known[expr] = sp.Symbol(f"k{len(self._known)}", real=True)
+            self._known[expr] = sp.Symbol(f"k{len(self.constants)}", real=True)
             self.constants[self._known[expr]] = expr
         return self._known[expr]
 
     def collect(self, expr: sp.Expr) -> sp.Expr:
-        """Polynomial in the state symbols with its parameter-only coefficients replaced by constants."""
+        """Polynomial in the state symbols with its parameter-only coefficients replaced by constants, Horner's way in e and ed."""
         expr = sp.expand(expr)
         variables = sorted(expr.free_symbols - set(P.values()), key=lambda x: x.name)
         if not variables:
             return self.constant(expr)
         terms = sp.Poly(expr, *variables).terms()
-        return sum(
-            self.constant(c) * sp.prod(x**k for x, k in zip(variables, ks, strict=True)) for ks, c in terms
+        flat = sp.Add(
+            *(self.constant(c) * sp.prod(x**k for x, k in zip(variables, ks, strict=True)) for ks, c in terms)
         )
+        for edge in (STATE[13], STATE[5]):
+            flat = sp.collect(
+                flat, edge, lambda part, e=STATE[5]: sp.horner(part, wrt=e) if part.has(e) else part
+            )
+        return flat
+
+    def linear(self, expr: sp.Expr, variables) -> sp.Expr:
+        """A form linear in `variables` with coefficients in e: equal coefficients are computed once, whoever uses them."""
+        variables = [x for x in variables if not sp.sympify(x).is_number]
+        if not variables:
+            return self._shared(self.collect(expr))
+        poly = sp.Poly(sp.expand(expr), *variables)
+        total = sp.Integer(0)
+        for powers, coefficient in poly.terms():
+            total += self._shared(self.collect(coefficient)) * sp.prod(
+                x**k for x, k in zip(variables, powers, strict=True)
+            )
+        return total
+
+    def _shared(self, expr: sp.Expr) -> sp.Expr:
+        if expr.is_number or expr.is_Symbol or (-expr).is_Symbol:
+            return expr
+        if expr.could_extract_minus_sign():
+            return -self._shared(-expr)
+        if expr not in self._known:
+            self._known[expr] = self.let(f"c{len(self._known)}", expr)
+        return self._known[expr]
 
     def let(self, name: str, expr: sp.Expr) -> sp.Expr:
         """Name an intermediate result; numbers and plain symbols stay as they are."""
@@ -181,7 +212,8 @@ class Sheet:
         if expr.is_number or expr.is_Symbol:
             return expr
         symbol = sp.Symbol(name, real=True)
-        self.lines.append((symbol, expr))
+        if (symbol, expr) not in self.lines:
+            self.lines.append((symbol, expr))
         return symbol
 
     def let_vector(self, name: str, vector) -> sp.Matrix:
@@ -290,70 +322,137 @@ class Blade:
         return P["b_fyex"] - P["b_fxey"]
 
 
-def rotor_sum(sheet: Sheet, expr: sp.Expr, weight: str, blade: Blade) -> sp.Expr:
-    """Sum over the three blades of a blade polynomial times 1, cos or sin of the blade's place on the hub.
+AZIMUTH = sp.symbols("cos_blade sin_blade", real=True)  # of a generic blade's place on the hub
 
-    The blades differ only in f and fd, so the sum of a monomial is a harmonic sum such as f1 cos(0) + f2 cos(120) + f3 cos(240).
+
+def over_azimuth(expr: sp.Expr) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """(q0, qc, qs) of a polynomial in AZIMUTH = q0 + qc cos + qs sin at the three blades' places.
+
+    There cos(2 alpha) = cos(alpha) and sin(2 alpha) = -sin(alpha).
     """
-    expr = sp.expand(expr)
+    half = sp.Rational(1, 2)
+    reduced = {(0, 0): (1, 0, 0), (1, 0): (0, 1, 0), (0, 1): (0, 0, 1),
+               (2, 0): (half, half, 0), (0, 2): (half, -half, 0), (1, 1): (0, 0, -half)}  # fmt: skip
+    out = [sp.Integer(0)] * 3
+    for powers, coefficient in sp.Poly(sp.expand(expr), *AZIMUTH).terms():
+        out = [total + part * coefficient for total, part in zip(out, reduced[powers], strict=True)]
+    return out[0], out[1], out[2]
+
+
+def at_blades(sheet: Sheet, name: str, harmonics) -> list[sp.Expr]:
+    """q0 + qc cos + qs sin at the blades."""
+    mean, cosine, sine = (
+        sheet.let(f"{name}_{n}", x) for n, x in zip(("mean", "cos", "sin"), harmonics, strict=True)
+    )
+    if cosine == sine == 0:
+        return [mean] * 3
+    other = sheet.let(f"{name}_other", mean - cosine / 2)
+    values = mean + cosine, other + HALF_SQRT3 * sine, other - HALF_SQRT3 * sine
+    return [sheet.let(f"{name}_{i + 1}", x) for i, x in enumerate(values)]
+
+
+def rotor_sum(sheet: Sheet, expr: sp.Expr, blade: Blade) -> sp.Expr:
+    """Sum over the three blades of a polynomial in a generic blade's f, fd and AZIMUTH."""
     total = sp.Integer(0)
-    variables = (blade.f, blade.fd)
-    for (kf, kfd), coefficient in sp.Poly(expr, *variables).terms():
+    for (kf, kfd), coefficient in sp.Poly(sp.expand(expr), blade.f, blade.fd).terms():
+        mean, cosine, sine = over_azimuth(coefficient)
         if kf == kfd == 0:
-            total += 3 * coefficient if weight == "one" else 0
+            total += 3 * mean
         else:
-            total += coefficient * sp.Symbol(f"sum_{'f' * kf}{'d' * kfd}_{weight}", real=True)
+            own = harmonic_symbols("f" * kf + "d" * kfd)
+            scale = sp.Rational(1, 2) if kf == kfd == 1 else 1
+            total += scale * (3 * mean * own[0] + sp.Rational(3, 2) * (cosine * own[1] + sine * own[2]))
     return sheet.collect(total)
 
 
-def harmonic_sums(sheet: Sheet) -> None:
-    """The sums that `rotor_sum` refers to."""
+def harmonic_symbols(name: str) -> list[sp.Symbol]:
+    return [sp.Symbol(f"{name}_{weight}", real=True) for weight in ("mean", "cos", "sin")]
+
+
+def harmonic_sums(sheet: Sheet, names=("f", "d", "ff", "fd", "dd")) -> None:
+    """Mean, cosine and sine part over the rotor of the flaps, their rates and products: x_i = mean + cos cos_i + sin sin_i."""
     f, fd = STATE[2:5], STATE[10:13]
-    for name, product in {
+    products = {
         "f": f,
         "d": fd,
         "ff": [x * x for x in f],
-        "fd": [x * y for x, y in zip(f, fd, strict=True)],
+        "fd": [2 * x * y for x, y in zip(f, fd, strict=True)],  # the rate of ff
         "dd": [y * y for y in fd],
-    }.items():
-        one, two, three = (sheet.let(f"{name}_{i + 1}", x) for i, x in enumerate(product))
-        both = sheet.let(f"both_{name}", two + three)
-        for weight, value in {
-            "one": one + both,
-            "cos": one - both / 2,
-            "sin": HALF_SQRT3 * (two - three),
-        }.items():
-            sheet.lines.append((sp.Symbol(f"sum_{name}_{weight}", real=True), value))
+    }
+    for name in names:
+        one, two, three = (sheet.let(f"{name}_of_{i + 1}", x) for i, x in enumerate(products[name]))
+        mean, cosine, sine = harmonic_symbols(name)
+        sheet.lines.append((mean, (one + (two + three)) / 3))
+        sheet.lines.append((cosine, one - mean))
+        sheet.lines.append((sine, (two - three) / (2 * HALF_SQRT3)))
+
+
+def to_hub(v) -> sp.Matrix:
+    """Coned axes of the generic blade -> F."""
+    return rot_x_t(AZIMUTH[0], -AZIMUTH[1], cone(v))
 
 
 def sum_vector(sheet: Sheet, v: sp.Matrix, blade: Blade) -> sp.Matrix:
     """Sum over the blades of a vector given in coned axes, in frame F."""
-    x, y, z = cone(v)
-
-    def total(expr, weight):
-        return rotor_sum(sheet, expr, weight, blade)
-
-    return sp.Matrix([total(x, "one"), total(y, "cos") - total(z, "sin"), total(y, "sin") + total(z, "cos")])
+    return to_hub(v).applyfunc(lambda x: rotor_sum(sheet, x, blade))
 
 
-def sum_tensor(sheet: Sheet, j: sp.Matrix, blade: Blade) -> sp.Matrix:
-    """Sum over the blades of a symmetric tensor given in coned axes, in frame F.
+@dataclass
+class Tensor:
+    """Symmetric; `mean` and `difference` are the half sum and half difference of yy and zz."""
 
-    For three blades cos(2 alpha) = cos(alpha) and sin(2 alpha) = -sin(alpha) at alpha = 0, 120, 240 degrees.
-    """
+    xx: sp.Expr
+    xy: sp.Expr
+    xz: sp.Expr
+    yz: sp.Expr
+    mean: sp.Expr
+    difference: sp.Expr
 
-    def total(expr, weight):
-        return rotor_sum(sheet, expr, weight, blade)
+    def map(self, function) -> Tensor:
+        return Tensor(*(function(n, x) for n, x in vars(self).items()))
 
-    t = cone_tensor(j)
-    xy = total(t[0, 1], "cos") - total(t[0, 2], "sin")
-    xz = total(t[0, 1], "sin") + total(t[0, 2], "cos")
-    mean = total((t[1, 1] + t[2, 2]) / 2, "one")
-    difference = total((t[1, 1] - t[2, 2]) / 2, "cos") + total(t[1, 2], "sin")
-    yz = -total((t[1, 1] - t[2, 2]) / 2, "sin") + total(t[1, 2], "cos")
-    return sp.Matrix(
-        [[total(t[0, 0], "one"), xy, xz], [xy, mean + difference, yz], [xz, yz, mean - difference]]
+    def quadratic(self, sheet: Sheet, w) -> sp.Expr:
+        """w . T w"""
+        p = products(sheet, w)
+        return (
+            self.xx * p.xx + self.mean * 2 * p.mean + self.difference * 2 * p.difference
+            + 2 * (self.xy * p.xy + self.xz * p.xz + self.yz * p.yz)
+        )  # fmt: skip
+
+    def matrix(self, sheet: Sheet, name: str) -> sp.Matrix:
+        yy = sheet.let(f"{name}_yy", self.mean + self.difference)
+        zz = sheet.let(f"{name}_zz", self.mean - self.difference)
+        return sp.Matrix([[self.xx, self.xy, self.xz], [self.xy, yy, self.yz], [self.xz, self.yz, zz]])
+
+
+def products(sheet: Sheet, w) -> Tensor:
+    """w w^T"""
+    names = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2), "yy": (1, 1), "zz": (2, 2)}
+    p = {n: sheet.let(f"w_{n}", w[i] * w[j]) for n, (i, j) in names.items()}
+    half = sp.Rational(1, 2)
+    mean, difference = (
+        sheet.let(f"w_{n}", half * x) for n, x in (("mean", p["yy"] + p["zz"]), ("diff", p["yy"] - p["zz"]))
     )
+    return Tensor(p["xx"], p["xy"], p["xz"], p["yz"], mean, difference)
+
+
+def sum_tensor(sheet: Sheet, j: sp.Matrix, blade: Blade) -> Tensor:
+    """Sum over the blades of a symmetric tensor given in coned axes, in frame F."""
+    c, s = AZIMUTH
+    turn = sp.Matrix([[1, 0, 0], [0, c, -s], [0, s, c]])
+    # the square of c and s is 1, which the reduction to harmonics does not know of
+    t = (turn * cone_tensor(j) * turn.T).applyfunc(sp.expand)
+    yy, zz = t[1, 1], t[2, 2]
+    parts = Tensor(t[0, 0], t[0, 1], t[0, 2], t[1, 2], (yy + zz) / 2, (yy - zz) / 2)
+    return parts.map(lambda _, x: rotor_sum(sheet, x, blade))
+
+
+def with_edge_slope(sheet: Sheet, name: str, expr: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """A quadratic polynomial in e, and its derivative by e, sharing their parts."""
+    e = STATE[5]
+    square, linear, fixed = (sp.expand(expr).coeff(e, k) for k in (2, 1, 0))
+    slope = sheet.let(f"{name}_slope", linear + square * e)
+    return sheet.let(name, fixed + e * slope), sheet.let(f"{name}_by_e", slope + square * e)
 
 
 # --- motion of the tower top and the hub -------------------------------------------------------------------------------
@@ -464,6 +563,7 @@ class RotorInertia:
     edge_angular: sp.Matrix
     force: sp.Matrix  # integral (a - g) dm at zero q''
     moment: sp.Matrix  # integral rho x (a - g) dm about the apex
+    edge: sp.Expr  # integral du/de . (a - g) dm, summed
 
 
 def inertia_of(j: sp.Matrix) -> sp.Matrix:
@@ -486,13 +586,16 @@ def blade_symbols(number: int | None) -> Blade:
     return Blade(STATE[1 + number], e, STATE[9 + number], ed)
 
 
-def body_force(sheet, name, m, mass, first, first_rate, first_rate2, inertia, inertia_rate, spin_moment):
-    """Inertial plus gravity force and moment about the apex of a deforming body whose frame moves with m, zero q''."""
+def body_force(sheet, name, m, mass, first, first_rate, first_rate2, inertia, turning, spin_moment):
+    """Inertial plus gravity force and moment about the apex of a deforming body whose frame moves with m, zero q''.
+
+    `turning`: the inertia's rate times omega.
+    """
     w = m.omega
     whirl = sheet.let_vector(f"{name}_whirl", cross(w, first) + 2 * first_rate)
     force = m.acceleration * mass + cross(m.spin, first) + cross(w, whirl) + first_rate2
     momentum = sheet.let_vector(f"{name}_momentum", inertia * w + spin_moment)
-    moment = cross(first, m.acceleration) + inertia * m.spin + cross(w, momentum) + inertia_rate * w
+    moment = cross(first, m.acceleration) + inertia * m.spin + cross(w, momentum) + turning
     return sheet.let_vector(f"{name}_force", force), sheet.let_vector(f"{name}_moment", moment)
 
 
@@ -500,23 +603,80 @@ def rotor(sheet: Sheet, m: Motion) -> RotorInertia:
     """Hub and three blades as one body in frame F."""
     harmonic_sums(sheet)
     b = blade_symbols(None)
-    hub_tensor = sp.diag(P["h_ixx"], P["h_itt"], P["h_itt"])
-    first = sheet.let_vector("rs", sum_vector(sheet, b.first_moment(), b))
-    first_rate = sheet.let_vector("rsd", sum_vector(sheet, b.rate(b.first_moment()), b))
+    ed, w = b.ed, m.omega
+    first, edge_linear = (sp.Matrix(x) for x in zip(*(
+        with_edge_slope(sheet, f"rs_{n}", x) for n, x in zip("xyz", sum_vector(sheet, b.first_moment(), b), strict=True)
+    ), strict=True))  # fmt: skip
+    by_flap = sum_vector(sheet, sp.diff(b.first_moment(), b.f) * b.fd, b)
+    first_rate = sheet.let_vector("rsd", edge_linear * ed + by_flap)
     first_rate2 = sheet.let_vector("rsdd", sum_vector(sheet, b.first_moment_rate2(), b))
-    inertia = let_symmetric(
-        sheet, "ri", sum_tensor(sheet, inertia_of(b.second_moment()), b).applyfunc(sheet.collect) + hub_tensor
-    )
-    inertia_rate = let_symmetric(sheet, "rid", sum_tensor(sheet, b.rate(inertia_of(b.second_moment())), b))
-    angular_rate = b.angular("f") * b.fd + b.angular("e") * b.ed
-    spin_moment = sheet.let_vector("rl", sum_vector(sheet, angular_rate, b))
+    edge_angular = sheet.let_vector("rle", sum_vector(sheet, b.angular("e"), b))
+    spin_moment = sheet.let_vector("rl", edge_angular * ed + sum_vector(sheet, b.angular("f") * b.fd, b))
+
+    own = inertia_of(b.second_moment())
+    pairs = sum_tensor(sheet, own, b).map(lambda n, x: with_edge_slope(sheet, f"ri_{n}", x))
+    hub_tensor = sp.diag(P["h_ixx"], P["h_itt"], P["h_itt"])
+    inertia = let_symmetric(sheet, "rih", pairs.map(lambda _, pair: pair[0]).matrix(sheet, "ri") + hub_tensor)
+    by_edge = pairs.map(lambda _, pair: pair[1])
+    by_flap = sum_tensor(sheet, sp.diff(own, b.f) * b.fd, b)
+    rate = by_flap.map(lambda n, x: sheet.let(f"rid_{n}", x + getattr(by_edge, n) * ed))
+    turning = sheet.let_vector("turning", rate.matrix(sheet, "rid") * w)
     mass = sheet.constant(3 * P["b_m"] + P["h_m"])
     force, moment = body_force(
-        sheet, "rot", m, mass, first, first_rate, first_rate2, inertia, inertia_rate, spin_moment
+        sheet, "rot", m, mass, first, first_rate, first_rate2, inertia, turning, spin_moment
     )
-    edge_linear = sheet.let_vector("rpe", sum_vector(sheet, sp.diff(b.first_moment(), b.e), b))
-    edge_angular = sheet.let_vector("rle", sum_vector(sheet, b.angular("e"), b))
-    return RotorInertia(mass, first, inertia, edge_linear, edge_angular, force, moment)
+    # centrifugal, Coriolis (only the in-plane/out-of-plane pair of one blade contributes), weight and carried motion
+    along = rotor_sum(sheet, to_hub([0, 0, 1]).dot(w) * 2 * b.coriolis() * b.fd, b)
+    centrifugal = by_edge.quadratic(sheet, w) / 2
+    edge = edge_linear.dot(m.acceleration) + edge_angular.dot(m.spin) - centrifugal - along
+    return RotorInertia(
+        mass, first, inertia, edge_linear, edge_angular, force, moment, sheet.let("h_edge", edge)
+    )
+
+
+@dataclass
+class Flapwise:
+    """A quantity of each blade: what is the same for any flap plus the flap times the rest, both by harmonics."""
+
+    fixed: list[sp.Expr]
+    by_flap: list[sp.Expr]
+
+    @classmethod
+    def of(cls, sheet: Sheet, expr: sp.Expr, variables) -> Flapwise:
+        """A polynomial in a generic blade's f (linear) and AZIMUTH, and linear in `variables`."""
+        f = blade_symbols(None).f
+        parts = (
+            [sheet.linear(x, variables) for x in over_azimuth(sp.expand(expr).coeff(f, k))] for k in (0, 1)
+        )
+        return cls(*parts)
+
+    def at_blades(self, sheet: Sheet, name: str) -> list[sp.Expr]:
+        fixed, by_flap = (at_blades(sheet, f"{name}_{n}", x) for n, x in vars(self).items())
+        return [x + STATE[2 + i] * y for i, (x, y) in enumerate(zip(fixed, by_flap, strict=True))]
+
+
+def flap_coupling(sheet: Sheet, t, w) -> Flapwise:
+    """integral du/df . (t + w x rho) dm of each blade: t, w in F."""
+    b = blade_symbols(None)
+    linear, angular = to_hub(sp.diff(b.first_moment(), b.f)), to_hub(b.angular("f"))
+    return Flapwise.of(sheet, linear.dot(t) + angular.dot(w), [*t, *w])
+
+
+def flap_whirl(sheet: Sheet, w) -> Flapwise:
+    """integral du/df . (w x (w x rho) + 2 w x du/dt) dm of each blade."""
+    b = blade_symbols(None)
+    own = inertia_of(sp.diff(b.second_moment(), b.f))
+    c, s = AZIMUTH
+    turn = sp.Matrix([[1, 0, 0], [0, c, -s], [0, s, c]])
+    tensor = turn * cone_tensor(own) * turn.T
+    p = products(sheet, w)
+    whole = sp.Matrix(
+        [[p.xx, p.xy, p.xz], [p.xy, p.mean + p.difference, p.yz], [p.xz, p.yz, p.mean - p.difference]]
+    )
+    centrifugal = -sum(tensor[i, j] * whole[i, j] for i in range(3) for j in range(3)) / 2
+    twice = [sheet.let(f"w_ed_{n}", x * b.ed) for n, x in zip("xyz", w, strict=True)]
+    coriolis = 2 * b.coriolis() * to_hub([0, 0, 1]).dot(twice)
+    return Flapwise.of(sheet, sp.expand(centrifugal) + coriolis, [*vars(p).values(), *twice])
 
 
 def az_frame(sheet: Sheet, name: str, v, number: int) -> sp.Matrix:
@@ -528,36 +688,6 @@ def az_frame(sheet: Sheet, name: str, v, number: int) -> sp.Matrix:
 def coned(sheet: Sheet, name: str, v, number: int) -> sp.Matrix:
     """F -> the blade's coned axes."""
     return sheet.let_vector(f"{name}_c{number}", cone_t(az_frame(sheet, name, v, number)))
-
-
-def modal_inertia(sheet: Sheet, m: Motion, number: int) -> tuple[sp.Expr, sp.Expr]:
-    """integral du/df . (a - g) dm and integral du/de . (a - g) dm of one blade at zero q''."""
-    b = blade_symbols(number)
-    w = coned(sheet, "w", m.omega, number)
-    g = coned(sheet, "g", m.acceleration, number)
-    spin = coned(sheet, "sp", m.spin, number)
-    xx, yy, zz = (sheet.let(f"w{n}_{number}", w[i] * w[i]) for i, n in enumerate(("xx", "yy", "zz")))
-    xy, xz, yz = (
-        sheet.let(f"w{n}_{number}", w[i] * w[j]) for n, i, j in (("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
-    )
-    j = b.second_moment()
-    out = []
-    for mode, other_rate, sign in (("f", b.ed, 1), ("e", b.fd, -1)):
-        x = getattr(b, mode)
-        dj = sp.diff(j, x).applyfunc(sheet.collect)
-        centrifugal = (
-            xy * dj[0, 1]
-            + xz * dj[0, 2]
-            + yz * dj[1, 2]
-            - ((yy + zz) * dj[0, 0] + (xx + zz) * dj[1, 1] + (xx + yy) * dj[2, 2]) / 2
-        )
-        # 2 omega . integral (du/dt x du/dmode): only the in-plane/out-of-plane pair of one blade contributes
-        coriolis = 2 * sign * sheet.constant(b.coriolis()) * w[2] * other_rate
-        linear = sp.diff(b.first_moment(), x).applyfunc(sheet.collect)
-        angular = b.angular(mode).applyfunc(sheet.collect)
-        total = centrifugal + coriolis + linear.dot(g) + angular.dot(spin)
-        out.append(sheet.let(f"h_{mode}_{number}", total))
-    return out[0], out[1]
 
 
 # --- applied forces ----------------------------------------------------------------------------------------------------
@@ -585,19 +715,24 @@ class Aerodynamics:
         flap = TABLE[f"{name}_flap"] * STATE[9 + number]
         return total + flap + (TABLE[f"{name}_edge"] * STATE[13] if f"{name}_edge" in TABLE else 0)
 
-    def total(self, name: str) -> sp.Expr:
-        """Sum over the blades."""
-        flap = TABLE[f"{name}_flap"] * sp.Symbol("sum_d_one", real=True)
-        return 3 * (TABLE[name] * self.normal + TABLE[f"{name}_edge"] * STATE[13]) + flap
+    def flapwise(self) -> list[sp.Expr]:
+        """The generalised flap force of a blade that does not flap, by harmonics; times `pressure`."""
+        mean = TABLE["flap"] * self.normal + TABLE["flap_edge"] * STATE[13]
+        parts = ("kappa", self.kappa), ("y", self.inplane), ("skew", self.skew)
+        return [mean, *(sum(TABLE[f"flap_{key}"] * part[i] for key, part in parts) for i in (0, 1))]
+
+    def mean(self, name: str) -> sp.Expr:
+        """A third of the sum over the blades."""
+        flap = TABLE[f"{name}_flap"] * harmonic_symbols("d")[0]
+        return TABLE[name] * self.normal + TABLE[f"{name}_edge"] * STATE[13] + flap
 
     def harmonic(self, name: str) -> tuple[sp.Expr, sp.Expr]:
-        """Sums weighted with cos and sin of the blade's place; what all blades share drops out."""
+        """Two thirds of the sums weighted with cos and sin of the blade's place; what all blades share drops out."""
         out = []
-        for i, weight in enumerate(("cos", "sin")):
-            flap = TABLE[f"{name}_flap"] * sp.Symbol(f"sum_d_{weight}", real=True)
+        for i, rate in enumerate(harmonic_symbols("d")[1:]):
             parts = ("kappa", self.kappa), ("y", self.inplane), ("skew", self.skew)
             periodic = sum(TABLE[f"{name}_{key}"] * part[i] for key, part in parts)
-            out.append(sp.Rational(3, 2) * periodic + flap)
+            out.append(periodic + TABLE[f"{name}_flap"] * rate)
         return out[0], out[1]
 
 
@@ -624,13 +759,15 @@ def inflow(sheet: Sheet, m: Motion) -> Aerodynamics:
 
 def aero_resultant(sheet: Sheet, aero: Aerodynamics) -> tuple[sp.Matrix, sp.Matrix]:
     """Aerodynamic force and moment about the apex of the whole rotor, in F."""
-    cg, sg = P["cos_cone"], P["sin_cone"]
-    torque_force = sheet.let("pressure_r", aero.pressure * P["radius"])
-    t0 = aero.total("thrust")
+    sg = P["sin_cone"]
+    along = sheet.let("pressure_x", aero.pressure * sheet.constant(3 * P["cos_cone"]))
+    across = sheet.let("pressure_yz", aero.pressure * sp.Rational(3, 2))
+    radius = P["radius"]
     (tc, ts), (sc, ss) = aero.harmonic("thrust"), aero.harmonic("tangential")
     (qc, qs), (mc, ms) = aero.harmonic("torque"), aero.harmonic("bending")
-    force = sp.Matrix([cg * t0, sg * ts - sc, -sg * tc - ss]) * aero.pressure
-    moment = sp.Matrix([cg * aero.total("torque"), mc + sg * qs, ms - sg * qc]) * torque_force
+    force = sp.Matrix([along * aero.mean("thrust"), across * (sg * ts - sc), across * (-sg * tc - ss)])
+    along, across = sheet.let("pressure_rx", along * radius), sheet.let("pressure_ryz", across * radius)
+    moment = sp.Matrix([along * aero.mean("torque"), across * (mc + sg * qs), across * (ms - sg * qc)])
     return sheet.let_vector("aero_force", force), sheet.let_vector("aero_moment", moment)
 
 
@@ -711,23 +848,15 @@ def accelerations() -> tuple[Sheet, tuple[sp.Expr, ...]]:
     b_ff = sheet.constant(P["b_fxfx"] + P["b_fyfy"])
     b_fe = sheet.constant(P["b_fxex"] + P["b_fyey"])
     mass["ee"] = sheet.constant(3 * (P["b_exex"] + P["b_eyey"]))
-    f_sum, e, ed = sp.Symbol("sum_f_one", real=True), STATE[5], STATE[13]
-    force["e"] = (
-        aero.pressure * aero.total("edge") - 3 * (P["b_ke"] * e + P["b_de"] * ed) - P["b_kfe"] * f_sum
-    )
-    for number in (1, 2, 3):
-        b = blade_symbols(number)
-        h_f, h_e = modal_inertia(sheet, m, number)
-        force["e"] -= h_e
-        elastic = P["b_kf"] * b.f + P["b_kfe"] * e + P["b_df"] * b.fd
-        force[f"f{number}"] = sheet.let(
-            f"q_f{number}", aero.pressure * aero.load("flap", number) - h_f - elastic
-        )
-        linear = cone(sp.diff(b.first_moment(), b.f)).applyfunc(sheet.collect)
-        angular_f = cone(b.angular("f")).applyfunc(sheet.collect)
-        for key, (t, w) in columns.items():
-            t_i, w_i = (az_frame(sheet, f"{n}{key}", x, number) for n, x in (("t", t), ("w", w)))
-            mass[f"f{number}{key}"] = sheet.let(f"m_f{number}{key}", t_i.dot(linear) + w_i.dot(angular_f))
+    e, ed, f_mean = STATE[5], STATE[13], harmonic_symbols("f")[0]
+    elastic = P["b_ke"] * e + P["b_de"] * ed + P["b_kfe"] * f_mean
+    force["e"] = 3 * (aero.pressure * aero.mean("edge") - elastic) - r.edge
+    flap = flap_forces(sheet, m, aero)
+    for key, (t, w) in columns.items():
+        coupling = flap_coupling(sheet, t, w).at_blades(sheet, f"m_f_{key}")
+        for number in (1, 2, 3):
+            force[f"f{number}"] = flap[number - 1]
+            mass[f"f{number}{key}"] = sheet.let(f"m_f{number}{key}", coupling[number - 1])
     result = solve(sheet, mass, force, b_ff, b_fe)
     inverse = sheet.constant(1 / P["g_ratio"])
     generator = (twist * inverse - torque) * sheet.constant(1 / P["g_i"])
@@ -735,27 +864,60 @@ def accelerations() -> tuple[Sheet, tuple[sp.Expr, ...]]:
     return sheet, (*(result[k] for k in order), sheet.let("x_gen", generator))
 
 
+def flap_forces(sheet: Sheet, m: Motion, aero: Aerodynamics) -> list[sp.Expr]:
+    """Generalised force of each blade's flap at zero q''."""
+    carried, whirl = flap_coupling(sheet, m.acceleration, m.spin), flap_whirl(sheet, m.omega)
+    fixed = [
+        aero.pressure * q - x - y for q, x, y in zip(aero.flapwise(), carried.fixed, whirl.fixed, strict=True)
+    ]
+    fixed[0] -= P["b_kfe"] * STATE[5]
+    by_flap = [-x - y for x, y in zip(carried.by_flap, whirl.by_flap, strict=True)]
+    by_flap[0] -= P["b_kf"]
+    values = Flapwise(fixed, by_flap).at_blades(sheet, "q_f")
+    damping = sheet.let("flap_damping", aero.pressure * TABLE["flap_flap"] - P["b_df"])
+    return [sheet.let(f"q_f{i + 1}", x + damping * STATE[10 + i]) for i, x in enumerate(values)]
+
+
 def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Expr]:
     """Block elimination of the flap coordinates (their block is b_ff times unity), then LDL^T of the 4 x 4 rest."""
     inverse = sheet.constant(1 / b_ff)
-    keys = ("e", "p", "a", "s")
-    column = {(i, k): (b_fe if k == "e" else mass[f"f{i}{k}"]) for i in (1, 2, 3) for k in keys}
-    scaled = {
-        ik: sheet.let(f"y_{ik[0]}{ik[1]}", inverse * c) if ik[1] != "e" else sheet.constant(inverse * c)
-        for ik, c in column.items()
+    keys, blades = ("e", "p", "a", "s"), (1, 2, 3)
+    # the coupling to edge and rotor is the same for all blades
+    column = {i: [mass[f"f{n}{i}"] for n in blades] for i in ("a", "s")} | {"e": b_fe, "p": mass["f1p"]}
+    flap = [force[f"f{n}"] for n in blades]
+
+    def shared(i: str) -> bool:
+        return not isinstance(column[i], list)
+
+    total = {i: sheet.let(f"sum_{i}", sum(column[i])) for i in ("a", "s")} | {
+        "q": sheet.let("sum_q", sum(flap))
     }
+    scaled = {"e": sheet.constant(inverse * b_fe), "p": sheet.let("y_p", inverse * column["p"])}
+
+    def eliminated(i: str, j: str) -> sp.Expr:
+        """What the flaps take from row i, column j (or `q`, the right side)."""
+        other = flap if j == "q" else column[j]
+        if shared(i):
+            return scaled[i] * total[j] if isinstance(other, list) else 3 * scaled[i] * other
+        if isinstance(other, list):
+            return inverse * sum(x * y for x, y in zip(column[i], other, strict=True))
+        return eliminated(j, i)
+
     lower: dict[tuple[str, str], sp.Expr] = {}
     pivot: dict[str, sp.Expr] = {}
     scaled_row: dict[tuple[str, str], sp.Expr] = {}
     rhs: dict[str, sp.Expr] = {}
     for r, i in enumerate(keys):
-        right = force[i] - sum(scaled[n, i] * force[f"f{n}"] for n in (1, 2, 3))
+        right = sheet.let(f"r_{i}", force[i] - eliminated(i, "q"))
         for j in keys[: r + 1]:
             m_ij = mass[i + j] if i + j in mass else mass[j + i]
-            s_ij = sheet.let(f"s_{i}{j}", m_ij - sum(scaled[n, i] * column[n, j] for n in (1, 2, 3)))
+            s_ij = m_ij - eliminated(i, j)
+            s_ij = sheet.constant(s_ij) if i == j == "e" else sheet.let(f"s_{i}{j}", s_ij)
             for k in keys[: keys.index(j)]:
                 s_ij = s_ij - lower[i, k] * scaled_row[j, k]
-            if i == j:
+            if i == "e":
+                pivot[i] = sheet.constant(1 / s_ij)
+            elif i == j:
                 pivot[i] = sheet.let(f"inv_{i}", 1 / s_ij)
             else:
                 scaled_row[i, j] = sheet.let(f"v_{i}{j}", s_ij)
@@ -767,9 +929,10 @@ def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Exp
     for r in range(3, -1, -1):
         i = keys[r]
         x[i] = sheet.let(f"x_{i}", rhs[i] * pivot[i] - sum(lower[j, i] * x[j] for j in keys[r + 1 :]))
-    for n in (1, 2, 3):
-        coupling = sum(column[n, k] * x[k] for k in keys)
-        x[f"f{n}"] = sheet.let(f"x_f{n}", inverse * (force[f"f{n}"] - coupling))
+    common = sheet.let("x_common", b_fe * x["e"] + column["p"] * x["p"])
+    for n in blades:
+        coupling = sum(column[k][n - 1] * x[k] for k in ("a", "s"))
+        x[f"f{n}"] = sheet.let(f"x_f{n}", inverse * (flap[n - 1] - common - coupling))
     return x
 
 
@@ -806,7 +969,7 @@ def blade_root(
     p_f, p_e = (sp.diff(b.first_moment(), x) for x in (b.f, b.e))
     force, moment = body_force(
         sheet, f"blade{number}", own, P["b_m"], first, b.rate(b.first_moment()), b.first_moment_rate2(),
-        inertia, inertia_rate, l_f * b.fd + l_e * b.ed,
+        inertia, inertia_rate * own.omega, l_f * b.fd + l_e * b.ed,
     )  # fmt: skip
     force = force + p_f * fdd + p_e * edd
     moment = moment + l_f * fdd + l_e * edd
@@ -827,9 +990,7 @@ def from_blade(v, number: int) -> sp.Matrix:
 def load_channels() -> tuple[Sheet, dict[str, sp.Expr]]:
     """Loads by their channel names from states, wind and the accelerations (`ACCELERATION`)."""
     sheet = Sheet()
-    for name, x in zip(("f", "d"), (STATE[2:5], STATE[10:13]), strict=True):
-        both = x[1] + x[2]
-        sheet.lines.append((sp.Symbol(f"sum_{name}_one", real=True), x[0] + both))
+    harmonic_sums(sheet, ("d",))
     top = tower_top(sheet)
     m = hub(sheet, top)
     aero = inflow(sheet, m)
@@ -854,7 +1015,7 @@ def load_channels() -> tuple[Sheet, dict[str, sp.Expr]]:
     out |= tower_base(sheet, top, force, moment)
     out["low_speed_shaft_torque"] = shaft_torque(sheet)
     out["generator_torque"] = generator_torque(sheet)
-    out["rotor_thrust"] = P["cos_cone"] * aero.total("thrust") * aero.pressure
+    out["rotor_thrust"] = sheet.constant(3 * P["cos_cone"]) * aero.mean("thrust") * aero.pressure
     out["tower_top_fore_aft_acceleration"], out["tower_top_side_side_acceleration"] = ACCELERATION[0:2]
     return sheet, out
 

@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _rhs, _loads = kernel.rhs, kernel.loads
-_SCRATCH = max(kernel.RHS_ROWS, kernel.LOADS_ROWS) * LANES
-_ROW = len(kernel.TABLES) * LANES
 
 
 @njit(nogil=True)
@@ -61,8 +59,8 @@ def from_groups(groups: Array, k: int, n: int) -> Array:
 
 
 def work_space() -> tuple[Array, Array, NDArray[np.int64]]:
-    """scratch, row and clamped-look-up counters of one kernel call."""
-    return np.zeros(_SCRATCH), np.zeros(_ROW), np.zeros(LANES, np.int64)
+    """scratch, row (not used any more) and clamped-look-up counters of one kernel call."""
+    return np.zeros(LANES), np.zeros(LANES), np.zeros(LANES, np.int64)
 
 
 def evaluate(data: KernelData, columns: Array, wind: Array) -> tuple[Array, int]:

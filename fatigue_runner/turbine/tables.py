@@ -67,10 +67,14 @@ class AeroTables:
         return CubicSpline(self.pitch, stack, axis=1)(pitch)
 
     def cells(self, pitch: float, names: Sequence[str]) -> NDArray[np.float64]:
-        """Flat array for the kernels: header, then per cell the coefficients 1, u, u^2, u^3 of all names side by side."""
+        """Flat array for the kernels: header, then per cell the coefficients 1, u, u^2, u^3 of all names side by side.
+
+        Zero columns fill up the last group of eight.
+        """
         values = self.at_pitch(pitch, names)
+        values = np.pad(values, ((0, 0), (0, -len(names) % HEADER)))
         step = float(self.tip_speed_ratio[1] - self.tip_speed_ratio[0])
-        powers = np.zeros((len(values) - 1, 4, len(names)))
+        powers = np.zeros((len(values) - 1, 4, values.shape[1]))
         if self.interpolation == "bilinear":
             powers[:, 0], powers[:, 1] = values[:-1], np.diff(values, axis=0)
         else:
