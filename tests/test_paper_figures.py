@@ -43,14 +43,14 @@ def test_every_integrator_meets_every_wind_at_every_step(measured):
     assert found == {
         (name, step)
         for step in paper.BOXED
-        for name in (*paper.CLASSICAL, *(f"heun + network, {m}" for m in paper.MODES))
+        for name in (*paper.CLASSICAL, *(f"heun + network, {m}" for m in ("enhanced", "hybrid")))
     }
     assert all(len(o.delta_e_range) == 3 for o in measured["outcomes"])
 
 
 def test_a_network_of_zeros_is_heun_and_its_hybrid_without_trust_is_rk3(measured):
     for step in paper.BOXED:
-        enhanced, hybrid = (outcome(measured, f"heun + network, {m}", step) for m in paper.MODES)
+        enhanced, hybrid = (outcome(measured, f"heun + network, {m}", step) for m in ("enhanced", "hybrid"))
         np.testing.assert_allclose(
             enhanced.delta_e_range, outcome(measured, "heun", step).delta_e_range, rtol=1e-6
         )
@@ -59,6 +59,25 @@ def test_a_network_of_zeros_is_heun_and_its_hybrid_without_trust_is_rk3(measured
         )
         assert hybrid.accepted == [0.0] * 3
         assert hybrid.evaluations == outcome(measured, "rk3", step).evaluations
+        assert paper.at_equal_cost(measured, hybrid) == pytest.approx(
+            np.median(hybrid.delta_e_range), rel=1e-6
+        )
+
+
+def test_what_costs_less_than_rk3_at_its_largest_step_is_not_compared_beyond_the_curve(measured):
+    assert paper.at_equal_cost(measured, outcome(measured, "heun", 0.01)) is None
+
+
+def test_an_integrator_is_counted_worse_than_rk3_wind_by_wind(measured):
+    enhanced = outcome(measured, "heun + network, enhanced", 0.01)
+    assert paper.worse_than_rk3(measured, enhanced) == (3, pytest.approx(_largest_ratio(measured)))
+    assert paper.worse_than_rk3(measured, outcome(measured, "heun", 0.01)) is None
+    assert "| 3 (at most" in "\n".join(paper.text(measured))
+
+
+def _largest_ratio(measured):
+    a, b = (np.array(outcome(measured, name, 0.01).delta_e_range) for name in ("heun", "rk3"))
+    return np.sqrt((a / b).max())
 
 
 def test_evaluations_are_stages_over_the_step(measured):

@@ -14,9 +14,14 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.benchmark.cases import Cases
-from fatigue_runner.benchmark.work_precision import Point, Reference, evaluate
+from fatigue_runner.benchmark.entries import ADAPTIVE
+from fatigue_runner.benchmark.points import Point, Reference, evaluate
+from fatigue_runner.compiled import njit
+from fatigue_runner.integrators.stepping import wind_at
+from fatigue_runner.turbine.generated import kernel
+from fatigue_runner.turbine.lanes import LANES, to_groups, work_space
 
-TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+_rhs = kernel.rhs
 METHODS = ("dop853-adaptive", "tsit5-adaptive")
 # Absolute tolerance of a state as a fraction of its range: the states differ by four orders of magnitude.
 ABSOLUTE = 1.0
@@ -24,7 +29,7 @@ ABSOLUTE = 1.0
 
 @dataclass
 class Solved:
-    """What `work_precision.evaluate` needs of a trajectory, and the evaluations it took."""
+    """What `points.evaluate` needs of a trajectory, and the evaluations it took."""
 
     time: np.ndarray
     state: np.ndarray
@@ -39,61 +44,32 @@ class Solved:
         return float(self.time[-1] - self.time[0])
 
 
+@njit(nogil=True)
+def _slope(t, x, wind, work, model):
+    """f(t, x) (16,) of one case: the same state in every lane, the first one read."""
+    cell_duration, block = wind
+    state, p, slope, clamped = work
+    tables, count, constants, scratch, row = model
+    for i in range(16):
+        for j in range(LANES):
+            state[i * LANES + j] = x[i]
+    wind_at(t, cell_duration, block, p)
+    _rhs(state, p, slope, 0, tables, count, constants, scratch, row, clamped)
+    out = np.empty(16)
+    for i in range(16):
+        out[i] = slope[i * LANES]
+    return out
+
+
 def right_hand_side(cases: Cases, wind: Any, duration: float) -> Callable[[float, np.ndarray], np.ndarray]:
     """f(t, x) of one case, compiled; the lanes beside it are wasted."""
-    import numba
-
-    from fatigue_runner.integrators.stepping import wind_at
-    from fatigue_runner.turbine.generated import kernel
-    from fatigue_runner.turbine.lanes import to_groups, work_space
-
-    lanes, data = kernel.LANES, cases.turbine.kernel_data(cases.pitch)
+    data = cases.turbine.kernel_data(cases.pitch)
     cell_duration, cells = wind.cells(duration)
     block = to_groups(np.ascontiguousarray(cells.reshape(-1, 1))).reshape(len(cells), 4, -1)
     scratch, row, clamped = work_space()
-    state, p, slope = np.zeros(16 * lanes), np.zeros(3 * lanes), np.zeros(16 * lanes)
-    rhs = kernel.rhs
-    global _compiled
-    if _compiled is None:
-
-        @numba.njit(nogil=True)
-        def call(
-            t, x, cell_duration, block, state, p, slope, tables, count, constants, scratch, row, clamped
-        ):
-            for i in range(16):
-                for j in range(lanes):
-                    state[i * lanes + j] = x[i]
-            wind_at(t, cell_duration, block, p)
-            rhs(state, p, slope, 0, tables, count, constants, scratch, row, clamped)
-            out = np.empty(16)
-            for i in range(16):
-                out[i] = slope[i * lanes]
-            return out
-
-        _compiled = call
-    compiled: Any = _compiled
-
-    def f(t: float, x: np.ndarray) -> np.ndarray:
-        return compiled(
-            t,
-            x,
-            cell_duration,
-            block,
-            state,
-            p,
-            slope,
-            data.tables,
-            data.cells,
-            data.constants,
-            scratch,
-            row,
-            clamped,
-        )
-
-    return f
-
-
-_compiled: Any = None
+    work = np.zeros(16 * LANES), np.zeros(3 * LANES), np.zeros(16 * LANES), clamped
+    model = data.tables, data.cells, data.constants, scratch, row
+    return lambda t, x: _slope(t, x, (cell_duration, block), work, model)
 
 
 def solver(name: str) -> Any:
@@ -113,14 +89,25 @@ def solver(name: str) -> Any:
     return Tsit5
 
 
-def solve(cases: Cases, number: int, reference: Any, name: str, tolerance: float) -> Solved:
-    """One case at one relative tolerance; outputs between steps by the quintic that the fixed-step methods use."""
+def ranges(cases: Cases, number: int) -> np.ndarray:
+    """(16,) extent of every state in a case."""
+    from fatigue_runner.integrators import simulate_block
+
+    found = simulate_block(
+        cases.turbine, "rk4", 0.02, [cases.winds[number]], cases.initial[number : number + 1], cases.duration,
+        cases.output_step, pitch=cases.pitch,
+    )[0]  # fmt: skip
+    return np.ptp(found.state, axis=0)
+
+
+def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
+    """One whole case at one relative tolerance; outputs between steps by the quintic that the fixed-step methods use."""
     from fatigue_runner.integrators.output import hermite_weights
 
-    wind, times = cases.winds[number], reference.time
-    duration = float(times[-1])
+    wind, duration = cases.winds[number], cases.duration
+    times = np.arange(round(duration / cases.output_step) + 1) * cases.output_step
     f = right_hand_side(cases, wind, duration)
-    scale = np.ptp(reference.state, axis=0)
+    scale = ranges(cases, number)
     begin = time.perf_counter()
     stepper = solver(name)(
         f, 0.0, cases.initial[number], duration, rtol=tolerance, atol=ABSOLUTE * tolerance * scale
@@ -153,21 +140,16 @@ def solve(cases: Cases, number: int, reference: Any, name: str, tolerance: float
     return Solved(times, states, signals, loads, stepper.nfev, seconds, failed)
 
 
-def measure(cases: Cases, reference: Reference, count: int = 4) -> list[Point]:
-    """Points of the adaptive methods on the first `count` cases; `step` is the mean step [s]."""
+def measure(cases: Cases, reference: Reference, name: str, tolerance: float, count: int) -> Point:
+    """The point of an adaptive method on `count` of the cases; `step` is the mean step [s]."""
     chosen = list(range(0, len(cases.winds), max(1, len(cases.winds) // count)))[:count]
     part = Reference([reference.trajectories[i] for i in chosen], [reference.loads[i] for i in chosen])
-    points = []
-    for name in METHODS:
-        for tolerance in TOLERANCES:
-            block: Sequence[Any] = [
-                solve(cases, i, reference.trajectories[i], name, tolerance) for i in chosen
-            ]
-            rate = sum(s.evaluations for s in block) / len(block) / cases.duration
-            stages = 12 if name == "dop853-adaptive" else 6
-            seconds = sum(s.seconds for s in block) / len(block) / cases.duration
-            point = Point(
-                cases.name, f"{name} rtol {tolerance:g}", stages / rate, rate, {"interpreter": seconds}
-            )
-            points.append(evaluate(block, part, cases, point))
-    return points
+    block: Sequence[Any] = [solve(cases, i, name, tolerance) for i in chosen]
+    rate = sum(s.evaluations for s in block) / len(block) / cases.duration
+    stages = 12 if name == "dop853-adaptive" else 6
+    seconds = sum(s.seconds for s in block) / len(block) / cases.duration
+    label = f"{name}, tolerance {tolerance:g}"
+    wall = {"interpreter": seconds}
+    return evaluate(
+        block, part, cases, Point(cases.name, name, stages / rate, rate, name, label, ADAPTIVE, wall=wall)
+    )

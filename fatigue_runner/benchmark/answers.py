@@ -1,15 +1,25 @@
-"""What the points say: the Pareto front, and the cheapest method for an accuracy, in words."""
+"""What the points say: the Pareto front, and the cheapest integrator for an accuracy, classical against corrected.
+
+The cost of an accuracy is read from a method's curve: between the two neighbouring steps whose errors enclose it, by a straight
+line in log cost over log error; where already the largest useful step is closer, that step's cost. Never extrapolated: a curve that
+does not reach an accuracy has no cost for it. A corrector's curve runs through the steps it was trained for; one between them takes
+seconds to train.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from fatigue_runner.benchmark.work_precision import Point
+from fatigue_runner.benchmark.entries import ADAPTIVE, CLASSICAL, ENHANCED, HYBRID
+from fatigue_runner.benchmark.points import Point
 
 NRMSE_LEVELS = (1e-2, 1e-3, 1e-4, 1e-5)
 DEL_LEVELS = (1e-2, 1e-3)
 USELESS = 0.1  # a point with a larger error is no answer to anything
+PLAIN, CORRECTED = (CLASSICAL, ADAPTIVE), (ENHANCED, HYBRID)
 
 Cost = Callable[[Point], float | None]
 Error = Callable[[Point], float | None]
@@ -31,6 +41,13 @@ def del_error(point: Point) -> float | None:
     return point.del_error_max
 
 
+COSTS: dict[str, Cost] = {"wall": wall, "evaluations": evaluations}
+LEVELS: tuple[tuple[str, Error, float], ...] = (
+    *((f"NRMSE {level:.0e}", nrmse, level) for level in NRMSE_LEVELS),
+    *((f"DEL error {level * 100:g} %", del_error, level) for level in DEL_LEVELS),
+)
+
+
 def front(points: Iterable[Point], cost: Cost, error: Error) -> list[Point]:
     """Points that no other one beats in both cost and error, the cheapest first; none that diverged."""
     usable = []
@@ -47,41 +64,145 @@ def front(points: Iterable[Point], cost: Cost, error: Error) -> list[Point]:
     return found
 
 
-def cheapest(points: Iterable[Point], cost: Cost, error: Error, level: float) -> list[Point]:
-    """Of every method its cheapest point with at most that error, the cheapest method first."""
-    by_method: dict[str, tuple[float, Point]] = {}
+@dataclass(frozen=True)
+class Reached:
+    """What an accuracy costs on one curve: time [s] (None where it was not measured) and evaluations per simulated second, step [s].
+
+    between: the labels of the points that it was read between, or of the one that has it.
+    """
+
+    series: str
+    kind: str
+    wall: float | None
+    evaluations: float
+    step: float
+    between: tuple[str, ...]
+
+    def cost(self, name: str) -> float:
+        """One of `COSTS` by its name."""
+        value = getattr(self, name)
+        assert value is not None
+        return value
+
+
+def reach(points: Sequence[Point], cost: Cost, error: Error, level: float) -> Reached | None:
+    """The cheapest way to an error of at most `level` on one curve; None where the curve does not get there."""
+    curve = front(points, cost, error)
+    errors = [error(p) or 0.0 for p in curve]
+    i = next((i for i, e in enumerate(errors) if e <= level), None)
+    if i is None:
+        return None
+    here = curve[i]
+    if i == 0 or errors[i] <= 0.0:
+        return Reached(
+            here.series, here.kind, wall(here), here.evaluations_per_second, here.step, (here.label,)
+        )
+    before = curve[i - 1]
+    share = math.log(errors[i - 1] / level) / math.log(errors[i - 1] / errors[i])
+
+    def between(value: Callable[[Point], float | None]) -> float | None:
+        a, b = value(before), value(here)
+        return None if a is None or b is None else a * (b / a) ** share
+
+    rate, step = between(evaluations), between(lambda p: p.step)
+    assert rate is not None and step is not None
+    return Reached(here.series, here.kind, between(wall), rate, step, (before.label, here.label))
+
+
+def ranking(points: Iterable[Point], cost: str, error: Error, level: float) -> list[Reached]:
+    """What every curve needs for an accuracy, the cheapest first."""
+    curves: dict[str, list[Point]] = {}
     for p in points:
-        c, e = cost(p), error(p)
-        if p.diverged or c is None or e is None or e > level:
-            continue
-        if p.method not in by_method or c < by_method[p.method][0]:
-            by_method[p.method] = c, p
-    return [p for _, p in sorted(by_method.values(), key=lambda item: item[0])]
+        curves.setdefault(p.series, []).append(p)
+    found = [reach(curve, COSTS[cost], error, level) for curve in curves.values()]
+    return sorted((r for r in found if r is not None), key=lambda r: r.cost(cost))
 
 
-def sentences(points: Sequence[Point], cost: Cost = wall) -> list[str]:
-    """One sentence per accuracy."""
+@dataclass(frozen=True)
+class Answer:
+    """The cheapest classical and the cheapest corrected integrator for an accuracy."""
+
+    target: str
+    cost: str
+    classical: Reached | None
+    corrected: Reached | None
+
+    @property
+    def ratio(self) -> float | None:
+        """How many times cheaper the corrected one is; below 1 it is dearer; None where one of them does not get there."""
+        if self.classical is None or self.corrected is None:
+            return None
+        return self.classical.cost(self.cost) / self.corrected.cost(self.cost)
+
+    def to_dict(self) -> dict[str, Any]:
+        both = {
+            name: asdict(r) if r else None
+            for name, r in (("classical", self.classical), ("corrected", self.corrected))
+        }
+        return {"target": self.target, "cost": self.cost, **both, "ratio": self.ratio}
+
+
+def answers(result: dict[str, Any], cost: str) -> list[Answer]:
+    """One per accuracy. The adaptive methods count by their evaluations; SciPy's time is an interpreter's."""
+    points = [*result["points"], *(result["adaptive"] if cost == "evaluations" else ())]
     out = []
-    for label, error, levels in (("NRMSE", nrmse, NRMSE_LEVELS), ("DEL error", del_error, DEL_LEVELS)):
-        for level in levels:
-            target = f"{label} {level:.0e}" if label == "NRMSE" else f"{label} {level * 100:g} %"
-            found = cheapest(points, cost, error, level)
-            if not found:
-                out.append(f"{target}: no method on the ladder reaches it.")
-                continue
-            first = found[0]
-            text = f"{target}: {first.label} is cheapest with {_cost(first)}"
-            if len(found) > 1:
-                second = found[1]
-                text += f"; next {second.label} with {_cost(second)} ({cost(second) / cost(first):.2f} times the cost)"  # type: ignore[operator]
-            out.append(text + ".")
+    for target, error, level in LEVELS:
+        found = ranking(points, cost, error, level)
+        best = [next((r for r in found if r.kind in kinds), None) for kinds in (PLAIN, CORRECTED)]
+        out.append(Answer(target, cost, *best))
     return out
 
 
-def _cost(point: Point) -> str:
-    time = point.wall.get("median")
-    shown = f"{time * 1e6:.3g} us and " if time is not None else ""
-    return f"{shown}{point.evaluations_per_second:.4g} evaluations per simulated second"
+def in_words(answer: Answer) -> str:
+    """One sentence."""
+    c, n, ratio = answer.classical, answer.corrected, answer.ratio
+    if c is None and n is None:
+        return f"{answer.target}: no integrator gets there."
+    if c is None or n is None:
+        one, other = (c or n), "corrected" if n is None else "classical"
+        assert one is not None
+        return f"{answer.target}: {_said(one)}; no {other} one gets there."
+    assert ratio is not None
+    verdict = f"{ratio:.2f} times cheaper" if ratio >= 1 else f"{1 / ratio:.2f} times dearer"
+    return f"{answer.target}: classical {_said(c)}; corrected {_said(n)}, {verdict}."
+
+
+def _said(r: Reached) -> str:
+    time = "" if r.wall is None or r.kind == ADAPTIVE else f"{r.wall * 1e6:.3g} µs and "
+    about = "about " if len(r.between) > 1 else ""
+    return f"{r.series} at {about}{r.step * 1e3:.3g} ms ({time}{r.evaluations:.3g} evaluations per simulated second)"
+
+
+@dataclass(frozen=True)
+class Duel:
+    """One corrected point against the cheapest classical curve at the same error; ratios above 1: the corrected one is cheaper."""
+
+    point: Point
+    error: float
+    rivals: dict[str, Reached | None]  # by cost
+
+    def ratio(self, cost: str) -> float | None:
+        rival, own = self.rivals[cost], COSTS[cost](self.point)
+        return None if rival is None or own is None else rival.cost(cost) / own
+
+
+def duels(result: dict[str, Any], error: Error = nrmse) -> list[Duel]:
+    """Every corrected point that did not diverge against what the classical methods need for its own error: nothing of the corrected
+    ones is interpolated here."""
+    plain = [p for p in result["points"] if not p.corrected]
+    out = []
+    for p in result["points"]:
+        own = error(p)
+        if not p.corrected or own is None:
+            continue
+        rivals = {}
+        for cost in COSTS:
+            found = ranking(
+                [*plain, *(result["adaptive"] if cost == "evaluations" else ())], cost, error, own
+            )
+            rivals[cost] = found[0] if found else None
+        out.append(Duel(p, own, rivals))
+    return out
 
 
 def summary(result: dict[str, Any]) -> dict[str, Any]:
@@ -91,5 +212,6 @@ def summary(result: dict[str, Any]) -> dict[str, Any]:
         "front_wall_nrmse": [p.label for p in front(points, wall, nrmse)],
         "front_evaluations_nrmse": [p.label for p in front(points, evaluations, nrmse)],
         "front_wall_del_error": [p.label for p in front(points, wall, del_error)],
-        "sentences": sentences(points),
+        "answers": [a.to_dict() for cost in COSTS for a in answers(result, cost)],
+        "in_words": [in_words(a) for a in answers(result, "wall")],
     }

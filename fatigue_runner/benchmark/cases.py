@@ -1,38 +1,86 @@
-"""The cases that every integrator of a work-precision benchmark meets, from a campaign file or the built-in ones."""
+"""The cases that every integrator of a work-precision benchmark meets, from a campaign file.
+
+A benchmark's file is a campaign file with two keys more: `cases`, a list of sections whose keys go before those of the top level
+(winds, duration, turbine, ...), each a campaign of its own; and `benchmark`, how the integrators are run (`Settings`). A plain
+campaign file is fine, too: one set of cases. What a file lists as `integrators` runs beside the methods.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-# Winds that nothing is tuned on. Seeds from 9000 on are kept for benchmarks: no corrector may be trained on them.
-BUILT_IN: tuple[dict[str, Any], ...] = (
-    {
-        "name": "turbulent",
-        "duration": 200,
-        "output_rate": 50,
-        "wind": {"type": "turbulent", "speeds": [6.3, 7.4, 8.6, 9.7], "turbulence_class": "B", "shear_exponent": 0.2,
-                 "seeds": [9001, 9002, 9003, 9004]},
-    },
-    {
-        "name": "constant",
-        "duration": 60,
-        "output_rate": 50,
-        "wind": {"type": "constant", "speeds": {"random": {"count": 16, "low": 5, "high": 10, "seed": 9000}},
-                 "vertical_shear": 0.1},
-    },
-)  # fmt: skip
-# What the benchmark needs to know of a campaign is not its integrators: all methods run at the benchmark's steps.
-_ANY = {"integrators": [{"method": "rk4", "step": 0.01}]}
+from fatigue_runner.campaign.section import Section, input_error, problem
+from fatigue_runner.campaign.source import Source, read_source
+from fatigue_runner.campaign.sweep import Sweep, expand
+from fatigue_runner.errors import InputError, did_you_mean
+
+# Seeds 9000 to 9999 are the benchmarks': correctors are trained on seeds from 100,000 on.
+SEEDS = range(9000, 10_000)
+PACKAGE = Path(__file__).parents[1]
+# What a campaign must have and the benchmark does not need: all methods run at the benchmark's steps.
+_ANY = [{"method": "rk4", "step": 0.01}]
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class Settings(Section):
+    """The key `benchmark`.
+
+    methods: null for every registered one; steps [s]: each method runs at those from its second unstable one down to the first
+    that costs more than `most_evaluations` per simulated second or brings its NRMSE below `finest`; correctors: names or paths,
+    null for every shipped one that fits the turbine; tolerances, adaptive_cases: of the adaptive methods, and how many of the cases
+    they solve; rounds: interleaved repeats of the timing; timed_evaluations: how long a timed run is, unless the cases are shorter.
+    """
+
+    methods: list[str] | None = None
+    steps: Sweep = Field(
+        default=[0.4, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.035, 0.025, 0.02, 0.015, 0.01, 0.007, 0.005, 0.0035, 0.002, 0.001]
+    )  # fmt: skip
+    most_evaluations: Positive = 1000.0
+    finest: Positive = 1e-6
+    correctors: list[str] | None = None
+    modes: list[Literal["enhanced", "hybrid"]] = Field(default=["enhanced", "hybrid"])
+    tolerances: list[Positive] = Field(default=[1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
+    adaptive_cases: int = Field(default=4, ge=0)
+    rounds: int = Field(default=7, ge=1)
+    timed_evaluations: Positive = 12_000.0
+
+    @field_validator("methods")
+    @classmethod
+    def _methods_exist(cls, names: list[str] | None) -> list[str] | None:
+        from fatigue_runner.integrators import METHODS
+
+        for name in names or ():
+            if name not in METHODS:
+                raise problem(f"unknown integrator {name!r}{did_you_mean(name, METHODS)}")
+        return names
+
+    @property
+    def ladder(self) -> list[float]:
+        """Steps [s], the largest first."""
+        return sorted({step for step, _ in expand(self.steps)}, reverse=True)
+
+
+class _File(BaseModel):
+    """The one key of the file that no campaign has; so named, a mistake is told with its place."""
+
+    model_config = ConfigDict(extra="ignore")
+    benchmark: Settings = Settings()
 
 
 @dataclass
 class Cases:
-    """Winds with everything that integrators share; initial (n, 16), times [s], pitch [rad]."""
+    """Winds with everything that integrators share; initial (n, 16), times [s], pitch [rad]; reference: (method, step [s]).
+
+    integrators: (method, step, corrector's file or "", mode) that the campaign lists.
+    """
 
     name: str
     turbine: Any
@@ -45,39 +93,72 @@ class Cases:
     channels: list[str]
     exponents: list[float]
     residue: str
-    integrators: list[tuple[str, float]]
+    reference: tuple[str, float]
+    integrators: list[tuple[str, float, str, str]]
+
+    @property
+    def turbulent(self) -> bool:
+        return any(wind.cell_key is not None for wind in self.winds)
 
 
-def load_cases(campaign: str | Path | Mapping[str, Any]) -> Cases:
-    """The cases of a campaign file or mapping; one that has no integrators is fine. Raises InputError with "file:line"."""
+# Of files that name none; its quality is measured in every run.
+REFERENCE = {"method": "dop853", "step": 0.005}
+
+
+def shipped(name: str = "work_precision.yaml") -> Path:
+    """A shipped campaign: beside the package in a source tree, in `share/` of the environment where a wheel was installed."""
+    for folder in (PACKAGE.parent, Path(sys.prefix) / "share" / "fatigue-runner"):
+        if (folder / "campaigns" / name).is_file():
+            return folder / "campaigns" / name
+    raise InputError(f"the shipped campaigns/{name} is not installed; give a campaign file")
+
+
+def load(campaign: str | Path | Mapping[str, Any]) -> tuple[list[Cases], Settings]:
+    """All sets of cases of a file or mapping, and how to run them. Raises InputError with "file:line" and what would be right."""
+    source = read_source(campaign)
+    sections = source.data.get("cases", [{}])
+    if not isinstance(sections, list) or not sections or not all(isinstance(s, Mapping) for s in sections):
+        raise InputError(
+            f"{source.where(('cases',))}: cases must be a list of sections, each with its own winds"
+        )
+    try:
+        settings = _File.model_validate(source.data).benchmark
+    except ValidationError as error:
+        raise input_error(error, source) from None
+    found = []
+    for number in range(len(sections)):
+        path: tuple[str | int, ...] = ("cases", number) if "cases" in source.data else ()
+        found.append(_cases(source.section(path, ("cases", "benchmark"))))
+    names = [cases.name for cases in found]
+    if len(set(names)) < len(names):
+        raise InputError(
+            f"{source.where(('cases',))}: two sets of cases have one name; give each its own `name`"
+        )
+    return found, settings
+
+
+def _cases(source: Source) -> Cases:
     from fatigue_runner.campaign import checks
     from fatigue_runner.campaign.cases import integrations, wind_cases
-    from fatigue_runner.campaign.source import read_source
     from fatigue_runner.campaign.spec import parse_campaign
 
-    listed = True
-    if isinstance(campaign, Mapping):
-        listed, campaign = "integrators" in campaign, {**_ANY, **campaign}
-    source = read_source(campaign)
+    listed = "integrators" in source.data
+    source.data.setdefault("integrators", _ANY)
+    source.data.setdefault("reference", REFERENCE)
     spec = parse_campaign(source)
+    if spec.reference is None:
+        raise InputError(
+            f"{source.where(('reference',))}: a benchmark needs a reference; name one or leave the key out"
+        )
     turbine = checks.load_turbine(spec, source)
     checks.check_pitch(spec, turbine, source)
     named = wind_cases(spec.wind, spec.duration, turbine, source)
     winds = checks.build_winds(named, spec, source)
     initial = checks.initial_states(named, winds, spec, turbine, source)
+    found = [i for i in integrations(spec, source) if not i.is_reference] if listed else []
     return Cases(
-        spec.name,
-        turbine,
-        winds,
-        np.stack([initial[case.id] for case in named]),
-        spec.duration,
-        1.0 / spec.output_rate,
-        float(np.deg2rad(spec.pitch)),
-        spec.discard,
-        list(spec.fatigue.channels),
-        list(spec.fatigue.wohler_exponents),
-        spec.fatigue.residue,
-        [(i.method, i.step) for i in integrations(spec, source) if not (i.is_reference or i.corrector)]
-        if listed
-        else [],
-    )
+        spec.name, turbine, winds, np.stack([initial[case.id] for case in named]), spec.duration, 1.0 / spec.output_rate,
+        float(np.deg2rad(spec.pitch)), spec.discard, list(spec.fatigue.channels), list(spec.fatigue.wohler_exponents),
+        spec.fatigue.residue, (spec.reference.method, spec.reference.step),
+        [(i.method, i.step, i.file, i.mode) for i in found],
+    )  # fmt: skip

@@ -229,6 +229,8 @@ def live(
     from fatigue_runner.benchmark import live as measured
 
     result = measured.measure(rounds, duration, at_once=at_once, say=lambda what: typer.echo(what, err=True))
-    Console().print(measured.table(result))
+    console = Console()
+    console.width = max(console.width, 110)
+    console.print(measured.table(result))
     _write(result, json)
     raise typer.Exit(0 if result["met"] else 1)

@@ -1,248 +1,246 @@
 """All integrators over a range of steps on the same cases: what each costs, and how far each is from the reference.
 
-Costs: evaluations of f, and measured time of whole steps with output, per simulated second and case, from repeats in which every
-integrator runs once per round on one pinned core; CPU time, which is the wall time of an idle machine. `delta_t`: the paper
-(arXiv:2504.05493) plots its errors over a time; its formula was not at hand, so it is taken as the mean of that time [s/s].
-Errors: see `accuracy` and `fatigue`.
+Two stages. Errors: every method's steps, every corrector, the adaptive methods and the reference's own quality, in worker
+processes, since nothing is timed there. Times: whole steps with output, one pinned thread, every integrator once per round, so that
+a slow minute of the machine meets all of them; CPU time, which is the wall time of an idle machine. The stages can be run apart
+(`errors`, `times`), the second alone on a machine that is quiet for two minutes only.
+
+`delta_t`: the paper (arXiv:2504.05493) plots its errors over a time; its formula is not public text, so it is taken as the median
+time per simulated second [s/s].
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fatigue_runner.benchmark import machine
-from fatigue_runner.benchmark.cases import Cases
-
-# Steps [s]; a method runs at those that cost it less than MOST evaluations per second, and up to the second unstable one.
-LADDER = (
-    0.4,
-    0.3,
-    0.2,
-    0.15,
-    0.1,
-    0.07,
-    0.05,
-    0.035,
-    0.025,
-    0.02,
-    0.015,
-    0.01,
-    0.007,
-    0.005,
-    0.0035,
-    0.002,
-    0.001,
+from fatigue_runner.benchmark import adaptive, machine
+from fatigue_runner.benchmark.cases import Cases, Settings
+from fatigue_runner.benchmark.entries import (
+    Entry,
+    fitting,
+    limit,
+    rungs,
+    seconds_per_second,
+    simulate,
+    timed_duration,
 )
-MOST = 1200.0
-REFERENCE = ("dop853", 0.005)
-CHECKS = (("dop853", 0.0025), ("rk7", 0.005), ("rk7", 0.0025))
+from fatigue_runner.benchmark.points import (
+    Point,
+    Reference,
+    evaluate,
+    make_reference,
+    point_of,
+    reference_quality,
+)
+from fatigue_runner.errors import InputError
+
+Say = Callable[[str], None]
 
 
 @dataclass
-class Point:
-    """One integrator on one set of cases. Costs per simulated second and case; errors pooled over the cases unless named worst.
+class Job:
+    """A piece of work of the first stage: a method down the steps, or `entries`, or an adaptive method at a tolerance; without
+    any of them the reference."""
 
-    nrmse {state: RMS over the cases}; nrmse_max: of the worst state; nrmse_worst: worst state of the worst case; del_error
-    {channel: worst |relative error| over exponents and cases}; delta_e, delta_e_range: one per case. diverged: how many cases;
-    diverged_at: the first time [s]. Nothing is known of the errors of a point with a diverged case.
-    """
-
-    cases: str
-    method: str
-    step: float
-    evaluations_per_second: float
-    wall: dict[str, float] = field(default_factory=dict)
-    diverged: int = 0
-    diverged_at: float | None = None
-    nrmse: dict[str, float] = field(default_factory=dict)
-    nrmse_max: float | None = None
-    nrmse_worst: float | None = None
-    del_error: dict[str, float] = field(default_factory=dict)
-    del_error_max: float | None = None
-    delta_e: list[float] = field(default_factory=list)
-    delta_e_range: list[float] = field(default_factory=list)
-
-    @property
-    def label(self) -> str:
-        return f"{self.method} {self.step * 1e3:g} ms"
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"delta_t": self.wall.get("median"), **self.__dict__}
+    number: int  # of the set of cases
+    cases: Cases
+    settings: Settings
+    reference: Reference | None = None
+    method: str = ""
+    entries: tuple[Entry, ...] = ()
+    tolerance: float = 0.0
 
 
-def integrators(cases: Cases) -> list[tuple[str, float]]:
-    """Every registered method at every step of the ladder that it can afford, and what the campaign lists."""
-    from fatigue_runner.integrators import METHODS, method, stability_limit
-
-    speed = min(w.mean_speed for w in cases.winds)
-    found = []
-    for name in METHODS:
-        limit = stability_limit(cases.turbine, name, speed, cases.pitch)
-        unstable = [step for step in LADDER if step > limit][-2:]
-        stable = [s for s in LADDER if s <= limit and method(name).evaluations_per_step / s <= MOST]
-        found += [(name, step) for step in unstable + stable if step <= cases.duration]
-    return found + [extra for extra in cases.integrators if extra not in found]
-
-
-def simulate(cases: Cases, method: str, step: float) -> list[Any]:
-    from fatigue_runner.integrators import simulate_block
-
-    groups: dict[Any, list[int]] = {}
-    for i, wind in enumerate(cases.winds):
-        groups.setdefault(wind.cell_key, []).append(i)
-    out: list[Any] = [None] * len(cases.winds)
-    for chosen in groups.values():
-        winds = [cases.winds[i] for i in chosen]
-        block = simulate_block(
-            cases.turbine,
-            method,
-            step,
-            winds,
-            cases.initial[chosen],
-            cases.duration,
-            cases.output_step,
-            pitch=cases.pitch,
-        )
-        for i, trajectory in zip(chosen, block, strict=True):
-            out[i] = trajectory
-    return out
+def run_job(job: Job) -> tuple[Job, dict[str, Any]]:
+    """The job without what it was given, and its part of the result."""
+    cases = job.cases
+    if job.reference is None:
+        reference = make_reference(cases, *cases.reference)
+        done: dict[str, Any] = {"reference": reference, "agreement": reference_quality(cases, reference)}
+    elif job.tolerance:
+        count = job.settings.adaptive_cases
+        done = {"adaptive": [adaptive.measure(cases, job.reference, job.method, job.tolerance, count)]}
+    elif job.method:
+        done = descend(cases, job.settings, job.reference, job.method)
+    else:
+        done = {"points": [measured(cases, entry, job.reference) for entry in job.entries]}
+    return Job(job.number, cases, job.settings, None, job.method, job.entries, job.tolerance), done
 
 
-def wall_time(block: Sequence[Any], cases: Cases) -> float:
-    """Seconds of the compiled time loop per simulated second and case."""
-    return sum(t.wall_time for t in block) / len(block) / cases.duration
+def measured(cases: Cases, entry: Entry, reference: Reference) -> Point:
+    block = simulate(cases, entry)
+    return evaluate(block, reference, cases, point_of(entry, cases, block))
 
 
-@dataclass
-class Reference:
-    """Trajectories of the reference and their DELs {(channel, exponent): load} per case."""
+def descend(cases: Cases, settings: Settings, reference: Reference, method: str) -> dict[str, Any]:
+    """A method's points from its second unstable step down to where it is close or dear enough; why no further; its limit."""
+    from fatigue_runner.integrators import method as find
+    from fatigue_runner.integrators.stability import LARGEST
 
-    trajectories: list[Any]
-    loads: list[dict[tuple[str, float], float | None]]
-
-
-def kept(trajectory: Any, cases: Cases) -> Any:
-    from fatigue_runner.campaign.evaluate import discarded
-
-    return discarded(trajectory, cases.discard)
-
-
-def equivalent_loads(trajectory: Any, cases: Cases) -> dict[tuple[str, float], float | None]:
-    """{(channel, exponent): short-term DEL}"""
-    from fatigue_runner.fatigue import channel_fatigue
-
-    out: dict[tuple[str, float], float | None] = {}
-    for channel in cases.channels:
-        found = channel_fatigue(
-            trajectory.loads[channel], cases.exponents, trajectory.duration, cases.residue
-        )
-        out |= {(channel, m): found.load(m) for m in cases.exponents}
-    return out
-
-
-def make_reference(cases: Cases, method: str, step: float) -> Reference:
-    block = [kept(t, cases) for t in simulate(cases, method, step)]
-    return Reference(block, [equivalent_loads(t, cases) for t in block])
-
-
-def evaluate(block: Sequence[Any], reference: Reference, cases: Cases, point: Point) -> Point:
-    """Fill in a point's errors; nothing but the divergence where a case diverged."""
-    from fatigue_runner.accuracy import compare
-    from fatigue_runner.fatigue import load_error
-
-    times = [t.diverged_at for t in block if t.diverged_at is not None]
-    if times:
-        point.diverged, point.diverged_at = len(times), min(times)
-        return point
-    tests = [kept(t, cases) for t in block]
-    found = [compare(a, b) for a, b in zip(tests, reference.trajectories, strict=True)]
-    point.nrmse = {
-        name: float(np.sqrt(np.mean([f.nrmse[name] ** 2 for f in found]))) for name in found[0].nrmse
-    }
-    point.nrmse_max = max(point.nrmse.values())
-    point.nrmse_worst = max(f.nrmse_max for f in found)
-    point.delta_e = [f.delta_e for f in found]
-    point.delta_e_range = [f.delta_e_range for f in found]
-    errors: dict[str, float] = {}
-    for test, theirs in zip(tests, reference.loads, strict=True):
-        for key, load in equivalent_loads(test, cases).items():
-            error = load_error(load, theirs[key])
-            if error is not None:
-                errors[key[0]] = max(errors.get(key[0], 0.0), abs(error))
-    point.del_error = errors
-    point.del_error_max = max(errors.values(), default=None)
-    return point
-
-
-def reference_quality(cases: Cases, reference: Reference) -> list[dict[str, Any]]:
-    """Largest NRMSE and DEL error between the reference and other methods and steps of high order."""
-    rows = []
-    for method, step in CHECKS:
-        point = evaluate(
-            simulate(cases, method, step), reference, cases, Point(cases.name, method, step, 0.0)
-        )
-        rows.append(
-            {
-                "method": method,
-                "step": step,
-                "nrmse_worst": point.nrmse_worst,
-                "del_error_max": point.del_error_max,
-            }
-        )
-    return rows
-
-
-def measure(
-    cases: Cases,
-    repeats: int = 5,
-    chosen: Sequence[tuple[str, float]] | None = None,
-    say: Callable[[str], None] = lambda what: None,
-) -> dict[str, Any]:
-    """Points of all integrators on one set of cases, and the quality of the reference they are measured against."""
-    say(f"{cases.name}: reference {REFERENCE[0]} at {REFERENCE[1] * 1e3:g} ms")
-    reference = make_reference(cases, *REFERENCE)
-    quality = reference_quality(cases, reference)
-    walls: dict[tuple[str, float], list[float]] = {key: [] for key in chosen or integrators(cases)}
+    largest = limit(cases, method)
+    steps, reason = rungs(cases, settings, method, largest)
     points = []
-    with machine.pinned():
-        for method, step in walls:
-            say(f"{cases.name}: {method} at {step * 1e3:g} ms")
-            block = simulate(cases, method, step)
-            rate = sum(t.evaluations for t in block) / sum(t.duration or np.inf for t in block)
-            points.append(evaluate(block, reference, cases, Point(cases.name, method, step, rate)))
-        running = [p for p in points if not p.diverged]
-        for round_ in range(repeats):
-            say(f"{cases.name}: timing, round {round_ + 1} of {repeats}")
-            for p in running:
-                walls[p.method, p.step].append(wall_time(simulate(cases, p.method, p.step), cases))
-    for p in running:
-        p.wall = machine.spread(walls[p.method, p.step])
+    for step in steps:
+        points.append(measured(cases, Entry(method, step), reference))
+        error = points[-1].nrmse_max
+        if error is not None and error < settings.finest:
+            reason = f"steps below {step * 1e3:g} ms: NRMSE is below {settings.finest:.0e} there"
+            break
+    cost = find(method).evaluations_per_step
+    row = {
+        "method": method,
+        "limit": largest,
+        "at_least": largest >= LARGEST,  # no larger step is tried
+        "evaluations_per_second": cost / largest if largest else None,
+    }
+    return {
+        "points": points,
+        "left_out": [f"{method}: {reason}"] if reason else [],
+        "stability_limits": [row],
+    }
+
+
+def jobs(number: int, cases: Cases, settings: Settings, reference: Reference) -> Iterator[Job]:
+    """All work on a set of cases, the longest first."""
+    from fatigue_runner.integrators import METHODS
+
+    common = (number, cases, settings, reference)
+    for method in adaptive.METHODS if settings.adaptive_cases else ():
+        for tolerance in sorted(settings.tolerances):
+            yield Job(*common, method, tolerance=tolerance)
+    for method in METHODS if settings.methods is None else settings.methods:
+        yield Job(*common, method)
+    for entry in fitting(cases, settings)[0]:
+        yield Job(*common, entries=(entry,))
+
+
+def warm_up(sets: Sequence[Cases], settings: Settings) -> None:
+    """Compile what the workers will load from the cache: every loop once, for a tenth of a second."""
+    from fatigue_runner.integrators import METHODS
+
+    for cases in sets:
+        entries = [Entry(method, 0.01) for method in METHODS] + fitting(cases, settings)[0]
+        for entry in entries:
+            simulate(cases, entry, max(0.1, 2 * cases.output_step))
+
+
+def errors(sets: Sequence[Cases], settings: Settings, workers: int, say: Say) -> list[dict[str, Any]]:
+    """First stage: a result per set of cases with all points, as yet without times."""
+    from fatigue_runner.campaign.pool import run_jobs
+
+    say("loading the compiled kernels")
+    warm_up(sets, settings)
+    results: list[dict[str, Any]] = [_empty(cases, settings) for cases in sets]
+    references: dict[int, Reference] = {}
+    say("references and their quality")
+    for job, done in run_jobs(run_job, [Job(i, c, settings) for i, c in enumerate(sets)], workers):
+        references[job.number] = done["reference"]
+        results[job.number]["reference"]["agreement"] = done["agreement"]
+        say(f"{job.cases.name}: reference")
+    todo = [job for i, c in enumerate(sets) for job in jobs(i, c, settings, references[i])]
+    for count, (job, done) in enumerate(run_jobs(run_job, todo, workers), start=1):
+        for key, values in done.items():
+            results[job.number][key] += values
+        what = job.method or ", ".join(entry.label for entry in job.entries)
+        say(
+            f"[{count}/{len(todo)}] {job.cases.name}: {what}{f', tolerance {job.tolerance:g}' if job.tolerance else ''}"
+        )
+    for result in results:
+        _sort(result)
+    return results
+
+
+def _empty(cases: Cases, settings: Settings) -> dict[str, Any]:
+    method, step = cases.reference
     return {
         "cases": cases.name,
         "turbine": cases.turbine.name,
+        "turbulent": cases.turbulent,
         "winds": [w.name for w in cases.winds],
         "duration": cases.duration,
-        "reference": {"method": REFERENCE[0], "step": REFERENCE[1], "agreement": quality},
-        "points": points,
-        "stability_limits": limits(cases),
+        "discard": cases.discard,
+        "reference": {"method": method, "step": step, "agreement": []},
+        "points": [],
+        "adaptive": [],
+        "stability_limits": [],
+        "left_out": fitting(cases, settings)[1],
     }
 
 
-def limits(cases: Cases) -> list[dict[str, Any]]:
-    """Per method: the largest stable step [s] at the cases' winds from the linearised turbine, per evaluation too."""
-    from fatigue_runner.integrators import METHODS, method, stability_limit
+def _sort(result: dict[str, Any]) -> None:
+    """Workers end in any order: methods as registered, then correctors by name; the largest step first."""
+    from fatigue_runner.integrators import METHODS
 
-    speeds = sorted({round(w.mean_speed, 1) for w in cases.winds})
-    speeds = speeds[:: max(1, len(speeds) // 4)]
-    rows = []
-    for name in METHODS:
-        limit = min(stability_limit(cases.turbine, name, v, cases.pitch) for v in speeds)
-        cost = method(name).evaluations_per_step
-        rows.append(
-            {"method": name, "limit": limit, "evaluations_per_second": cost / limit if limit else None}
+    place = {name: i for i, name in enumerate((*METHODS, *adaptive.METHODS))}
+    for key in ("points", "adaptive"):
+        result[key].sort(
+            key=lambda p: (p.corrected, p.series if p.corrected else place[p.method], -p.step, p.label)
         )
-    return rows
+    result["stability_limits"].sort(key=lambda row: place[row["method"]])
+    result["left_out"].sort()
+
+
+def times(
+    sets: Sequence[Cases], settings: Settings, results: Sequence[dict[str, Any]], rounds: int, say: Say
+) -> None:
+    """Second stage: fills in `wall` of all points that did not diverge."""
+    with machine.pinned():
+        for cases, result in zip(sets, results, strict=True):
+            correctors = {(e.name, e.mode): e for e in fitting(cases, settings)[0] if e.corrector}
+            running = [p for p in result["points"] if not p.diverged]
+            work = []
+            for p in running:
+                entry = correctors[p.corrector, p.kind] if p.corrector else Entry(p.method, p.step)
+                work.append((entry, timed_duration(cases, settings, p.evaluations_per_second)))
+            walls: list[list[float]] = [[] for _ in work]
+            for number in range(-1, rounds):  # one to warm up
+                say(f"{cases.name}: timing, round {number + 1} of {rounds}")
+                for (entry, duration), wall in zip(work, walls, strict=True):
+                    wall.append(seconds_per_second(simulate(cases, entry, duration), duration))
+            for p, wall in zip(running, walls, strict=True):
+                p.wall = machine.spread(wall[1:])
+
+
+def identity(sets: Sequence[Cases], settings: Settings) -> str:
+    """Hash of all that decides the errors, so that they are not timed with another program's methods or winds."""
+    from fatigue_runner.campaign.cases import code_hash
+
+    digest = hashlib.sha256(code_hash().encode())
+    digest.update(json.dumps(settings.model_dump(), sort_keys=True).encode())
+    for cases in sets:
+        values = (
+            cases.turbine.hash,
+            [w.label for w in cases.winds],
+            cases.duration,
+            cases.output_step,
+            cases.discard,
+        )
+        digest.update(
+            json.dumps([cases.name, cases.reference, cases.integrators, *values], sort_keys=True).encode()
+        )
+        for entry in fitting(cases, settings)[0]:
+            if entry.corrector is not None:
+                arrays = [a for a in (entry.corrector.linear, *entry.corrector.layers) if a is not None]
+                digest.update(
+                    entry.label.encode() + b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)
+                )
+    return digest.hexdigest()[:16]
+
+
+def reused(values: dict[str, Any], expected: str, where: str) -> list[dict[str, Any]]:
+    """The first stage's results as they were written. Raises InputError where they are of another program or campaign."""
+    if values.get("identity") != expected or "cases" not in values:
+        raise InputError(
+            f"{where} holds the errors of another version of the program, of its correctors or of the campaign; "
+            "run without --reuse"
+        )
+    for part in values["cases"]:
+        part["points"] = [Point.from_dict(p) for p in part["points"]]
+        part["adaptive"] = [Point.from_dict(p) for p in part["adaptive"]]
+    return values["cases"]

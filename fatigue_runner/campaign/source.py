@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,23 @@ class Source:
         """The place as a user reads it: `campaigns/sweep.yaml:14`."""
         line = self.line(path)
         return self.name if line is None else f"{self.name}:{line}"
+
+    def section(self, path: tuple[str | int, ...], without: Sequence[str] = ()) -> Source:
+        """The mapping at `path` laid over the top level, less the top level's keys `without`: one campaign of a file that
+        holds several. Places stay those of the file."""
+        own = self.data
+        for key in path:
+            own = own[key]
+        own = {key: value for key, value in own.items() if path or key not in without}
+        shared = {key: value for key, value in self.data.items() if key not in (*without, *own)}
+        out = Source(self.name, {**shared, **own}, self.text, self.folder)
+        out._lines = {
+            place: line for place, line in self._lines.items() if place[:1] in {(key,) for key in shared}
+        }
+        depth = len(path)
+        out._lines |= {place[depth:]: line for place, line in self._lines.items() if place[:depth] == path}
+        out._lines.setdefault((), 1)
+        return out
 
     def _plain(self, node: Any, path: tuple[str | int, ...]) -> Any:
         self._values += 1

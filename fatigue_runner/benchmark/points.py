@@ -1,0 +1,166 @@
+"""One integrator on one set of cases: what it costs and how far it is from the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.benchmark.cases import Cases
+from fatigue_runner.benchmark.entries import CLASSICAL, Entry, simulate
+
+
+@dataclass
+class Point:
+    """Costs per simulated second and case; errors pooled over the cases unless named worst.
+
+    series: what shares a curve; kind: classical, adaptive, enhanced or hybrid. nrmse {state: RMS over the cases}; nrmse_max: of the
+    worst state; nrmse_worst: worst state of the worst case; del_error {channel: worst |relative error| over exponents and cases};
+    delta_e, delta_e_range: one per case; accepted: share of a hybrid's output intervals. diverged: how many cases; diverged_at: the
+    first time [s]. Nothing is known of the errors of a point with a diverged case.
+    """
+
+    cases: str
+    method: str
+    step: float
+    evaluations_per_second: float
+    series: str = ""
+    label: str = ""
+    kind: str = CLASSICAL
+    corrector: str = ""
+    wall: dict[str, float] = field(default_factory=dict)
+    diverged: int = 0
+    diverged_at: float | None = None
+    nrmse: dict[str, float] = field(default_factory=dict)
+    nrmse_max: float | None = None
+    nrmse_worst: float | None = None
+    del_error: dict[str, float] = field(default_factory=dict)
+    del_error_max: float | None = None
+    delta_e: list[float] = field(default_factory=list)
+    delta_e_range: list[float] = field(default_factory=list)
+    accepted: float | None = None
+
+    def __post_init__(self) -> None:
+        self.series = self.series or self.method
+        self.label = self.label or f"{self.method} {self.step * 1e3:g} ms"
+
+    @property
+    def corrected(self) -> bool:
+        return bool(self.corrector)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"delta_t": self.wall.get("median"), **self.__dict__}
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Point:
+        return cls(**{f.name: values[f.name] for f in fields(cls) if f.name in values})
+
+
+def point_of(entry: Entry, cases: Cases, block: Sequence[Any]) -> Point:
+    """A point without its errors; evaluations per second of what was simulated, up to a divergence too."""
+    rate = sum(t.evaluations for t in block) / max(sum(t.duration for t in block), cases.output_step)
+    hybrid = entry.mode == "hybrid"
+    accepted = float(np.mean([t.accepted.mean() for t in block])) if hybrid else None
+    return Point(
+        cases.name, entry.method, entry.step, rate, entry.series, entry.label, entry.kind, entry.name, accepted=accepted
+    )  # fmt: skip
+
+
+@dataclass
+class Sample:
+    """What is kept of a reference trajectory; time (n,) [s], state (n, 16)."""
+
+    time: np.ndarray
+    state: np.ndarray
+
+
+@dataclass
+class Reference:
+    """Trajectories of the reference and their DELs {(channel, exponent): load} per case."""
+
+    trajectories: list[Any]
+    loads: list[dict[tuple[str, float], float | None]]
+
+
+def kept(trajectory: Any, cases: Cases) -> Any:
+    from fatigue_runner.campaign.evaluate import discarded
+
+    return discarded(trajectory, cases.discard)
+
+
+def equivalent_loads(trajectory: Any, cases: Cases) -> dict[tuple[str, float], float | None]:
+    """{(channel, exponent): short-term DEL}"""
+    from fatigue_runner.fatigue import channel_fatigue
+
+    out: dict[tuple[str, float], float | None] = {}
+    for channel in cases.channels:
+        found = channel_fatigue(
+            trajectory.loads[channel], cases.exponents, trajectory.duration, cases.residue
+        )
+        out |= {(channel, m): found.load(m) for m in cases.exponents}
+    return out
+
+
+def make_reference(cases: Cases, method: str, step: float) -> Reference:
+    """Raises InputError where the reference itself diverges."""
+    from fatigue_runner.errors import InputError
+
+    block = [kept(t, cases) for t in simulate(cases, Entry(method, step))]
+    lost = [t.diverged_at for t in block if t.diverged_at is not None]
+    if lost:
+        raise InputError(
+            f"{cases.name}: the reference {method} at {step * 1e3:g} ms diverges at {min(lost):.1f} s; give a smaller step"
+        )
+    return Reference([Sample(t.time, t.state) for t in block], [equivalent_loads(t, cases) for t in block])
+
+
+def evaluate(block: Sequence[Any], reference: Reference, cases: Cases, point: Point) -> Point:
+    """Fill in a point's errors; nothing but the divergence where a case diverged."""
+    from fatigue_runner.accuracy import compare
+    from fatigue_runner.fatigue import load_error
+
+    times = [t.diverged_at for t in block if t.diverged_at is not None]
+    if times:
+        point.diverged, point.diverged_at = len(times), min(times)
+        return point
+    tests = [kept(t, cases) for t in block]
+    found = [compare(a, b) for a, b in zip(tests, reference.trajectories, strict=True)]
+    point.nrmse = {
+        name: float(np.sqrt(np.mean([f.nrmse[name] ** 2 for f in found]))) for name in found[0].nrmse
+    }
+    point.nrmse_max = max(point.nrmse.values())
+    point.nrmse_worst = max(f.nrmse_max for f in found)
+    point.delta_e = [f.delta_e for f in found]
+    point.delta_e_range = [f.delta_e_range for f in found]
+    errors: dict[str, float] = {}
+    for test, theirs in zip(tests, reference.loads, strict=True):
+        for key, load in equivalent_loads(test, cases).items():
+            error = load_error(load, theirs[key])
+            if error is not None:
+                errors[key[0]] = max(errors.get(key[0], 0.0), abs(error))
+    point.del_error = errors
+    point.del_error_max = max(errors.values(), default=None)
+    return point
+
+
+def reference_quality(cases: Cases, reference: Reference) -> list[dict[str, Any]]:
+    """How far the reference is from itself at half its step, and from another method of high order at both: NRMSE of the worst
+    state of the worst case, largest DEL error."""
+    method, step = cases.reference
+    other = "rk7" if method == "dop853" else "dop853"
+    rows = []
+    for name, size in ((method, step / 2), (other, step), (other, step / 2)):
+        block = simulate(cases, Entry(name, size))
+        point = evaluate(block, reference, cases, point_of(Entry(name, size), cases, block))
+        rows.append(
+            {
+                "method": name,
+                "step": size,
+                "nrmse_worst": point.nrmse_worst,
+                "del_error_max": point.del_error_max,
+                "diverged": point.diverged,
+            }
+        )
+    return rows

@@ -1,0 +1,155 @@
+"""The benchmark's answers have known answers: fronts, costs read from curves, targets, all on points made by hand."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fatigue_runner.benchmark import answers, targets
+from fatigue_runner.benchmark.points import Point
+
+
+def point(series, step, cost, error, kind="classical", **others):
+    """cost: microseconds and evaluations per simulated second alike."""
+    corrector = f"{series}-{step}" if kind in ("enhanced", "hybrid") else ""
+    label = f"{series} {step * 1e3:g} ms"
+    values = {"wall": {"median": cost * 1e-6}, "nrmse_max": error, "del_error_max": error, **others}
+    return Point("x", series.split(" ")[0], step, cost, series, label, kind, corrector, **values)
+
+
+def result(points, turbulent=True, **others):
+    return {"points": points, "adaptive": [], "turbulent": turbulent, "turbine": "nrel5mw", **others}
+
+
+def test_the_front_holds_the_points_that_none_beats_and_none_that_diverged():
+    points = [
+        point("a", 0.1, 10, 1e-2),
+        point("b", 0.1, 20, 2e-2),
+        point("c", 0.1, 30, 1e-3),
+        point("d", 0.1, 30, 2e-3),
+        point("e", 0.1, 5, 1e-6, diverged=1),
+        point("f", 0.1, 1, 0.5),
+    ]
+    assert [p.series for p in answers.front(points, answers.wall, answers.nrmse)] == ["a", "c"]
+
+
+def test_the_cost_of_an_accuracy_lies_on_a_straight_line_in_log_log():
+    # an order-4 method: ten times the cost for 1e-4 of the error
+    curve = [point("a", 0.1, 10, 1e-1 * 0.9), point("a", 0.1, 10, 1e-2), point("a", 0.01, 100, 1e-6)]
+    found = answers.reach(curve, answers.wall, answers.nrmse, 1e-4)
+    assert found.wall == pytest.approx(10**1.5 * 1e-6)
+    assert found.evaluations == pytest.approx(10**1.5) and found.step == pytest.approx(10**-1.5)
+    assert found.between == ("a 100 ms", "a 10 ms")
+
+
+def test_a_curve_is_never_extrapolated():
+    curve = [point("a", 0.1, 10, 1e-3), point("a", 0.05, 20, 1e-4)]
+    assert answers.reach(curve, answers.wall, answers.nrmse, 1e-5) is None
+    # beyond its cheap end it costs what its largest step costs, although a larger one might do
+    found = answers.reach(curve, answers.wall, answers.nrmse, 1e-2)
+    assert found.wall == pytest.approx(10e-6) and found.between == ("a 100 ms",)
+
+
+def test_a_level_that_a_point_has_exactly_costs_what_the_point_costs():
+    curve = [point("a", 0.1, 10, 1e-3), point("a", 0.05, 20, 1e-4)]
+    assert answers.reach(curve, answers.wall, answers.nrmse, 1e-4).wall == pytest.approx(20e-6)
+
+
+def test_a_step_that_diverged_or_is_useless_bends_no_curve():
+    curve = [
+        point("a", 0.3, 2, 1e-9, diverged=2),
+        point("a", 0.2, 5, 70.0),
+        point("a", 0.1, 10, 5e-3),
+        point("a", 0.05, 20, 1e-4),
+    ]
+    assert answers.reach(curve, answers.wall, answers.nrmse, 1e-2).wall == pytest.approx(10e-6)
+
+
+def test_a_point_that_is_dearer_and_worse_than_another_of_its_curve_does_not_count():
+    curve = [point("a", 0.1, 10, 1e-3), point("a", 0.09, 12, 2e-3), point("a", 0.05, 20, 1e-4)]
+    without = [curve[0], curve[2]]
+    level = 5e-4
+    assert answers.reach(curve, answers.wall, answers.nrmse, level) == answers.reach(
+        without, answers.wall, answers.nrmse, level
+    )
+
+
+@given(
+    st.lists(st.tuples(st.floats(1, 1e3), st.floats(1e-8, 5e-2)), min_size=1, max_size=8),
+    st.floats(1e-8, 5e-2),
+)
+def test_what_an_accuracy_costs_lies_between_two_points_of_the_curve(values, level):
+    curve = [point("a", 1 / cost, cost, error) for cost, error in values]
+    found = answers.reach(curve, answers.evaluations, answers.nrmse, level)
+    good = [p.evaluations_per_second for p in curve if p.nrmse_max <= level]
+    assert (found is None) == (not good)
+    if found is not None:
+        assert min(p.evaluations_per_second for p in curve) * (1 - 1e-9) <= found.evaluations
+        assert found.evaluations <= min(good) * (1 + 1e-9)
+
+
+def test_classical_and_corrected_ones_are_named_with_the_ratio_of_their_costs():
+    found = result([
+        point("a", 0.1, 10, 1e-2), point("a", 0.01, 1000, 1e-6),
+        point("b", 0.1, 40, 1e-2),
+        point("a + affine, enhanced", 0.1, 8, 1e-3, "enhanced"),
+        point("a + affine, hybrid", 0.1, 16, 1e-3, "hybrid"),
+    ])  # fmt: skip
+    at = {a.target: a for a in answers.answers(found, "wall")}
+    best = at["NRMSE 1e-03"]
+    assert best.classical.series == "a" and best.corrected.series == "a + affine, enhanced"
+    # a: 10 to 1000 µs over four decades of error, so 10^1.5 at a quarter of them
+    assert best.ratio == pytest.approx(10**1.5 / 8)
+    assert "times cheaper" in answers.in_words(best)
+    assert at["NRMSE 1e-05"].corrected is None and at["NRMSE 1e-05"].ratio is None
+    assert "no corrected one gets there" in answers.in_words(at["NRMSE 1e-05"])
+
+
+def test_a_corrector_that_loses_is_said_to_be_dearer():
+    found = result([point("a", 0.1, 10, 1e-4), point("a + affine, enhanced", 0.1, 20, 1e-4, "enhanced")])
+    said = answers.in_words(answers.answers(found, "wall")[0])
+    assert said.endswith("2.00 times dearer.")
+
+
+def test_adaptive_methods_count_by_their_evaluations_and_not_by_an_interpreters_time():
+    found = result([point("a", 0.1, 10, 1e-4)])
+    found["adaptive"] = [point("d-adaptive", 0.1, 5, 1e-4, "adaptive", wall={"interpreter": 1.0})]
+    assert answers.answers(found, "wall")[0].classical.series == "a"
+    assert answers.answers(found, "evaluations")[0].classical.series == "d-adaptive"
+
+
+def test_a_corrector_is_held_against_the_classical_curves_at_its_own_error():
+    found = result([
+        point("a", 0.1, 10, 1e-2), point("a", 0.05, 100, 1e-4),
+        point("a + affine, enhanced", 0.1, 20, 1e-3, "enhanced"),
+        point("a + affine, hybrid", 0.1, 20, 1e-9, "hybrid"),
+    ])  # fmt: skip
+    duel, beyond = answers.duels(found)
+    assert duel.ratio("wall") == pytest.approx(math.sqrt(10 * 100) / 20)
+    assert beyond.ratio("wall") is None  # closer than any classical point: no ratio is invented
+
+
+def learned(step, cost, error, **others):
+    return point("rk4 + affine, enhanced", step, cost, error, "enhanced", **others)
+
+
+def test_targets_say_reached_or_missed():
+    plain = [point("a", 0.1, 40, 1e-2), point("a", 0.05, 400, 1e-5)]
+    good = result([*plain, learned(0.1, 20, 5e-5)])
+    found = targets.targets(good)
+    # at 1e-3 the classical curve costs 40 * 10^(1/3), at 1e-4 40 * 10^(2/3)
+    assert [round(float(t.found.split(" ")[0]), 2) for t in found[:2]] == [4.31, 9.28]
+    assert all(t.reached for t in found) and "moonshot" not in found[0].found and "moonshot" in found[1].found
+    bad = result([*plain, learned(0.1, 90, 5e-5)])
+    assert [t.reached for t in targets.targets(bad)] == [False, False, False, False, False]
+    assert str(targets.targets(bad)[0]).startswith("**missed**: 3 times less time")
+
+
+def test_the_papers_target_is_judged_on_the_papers_turbine_only():
+    p = point("heun + affine, enhanced", 0.01, 200, 1e-6, "enhanced", delta_e_range=[1e-11, 1e-12, 1e-9])
+    assert targets.targets(result([p], turbulent=False)) == []
+    judged = targets.targets(result([p], turbulent=False) | {"turbine": "t2b1i1cg"})
+    assert [t.reached for t in judged] == [True] and "1.0e-11" in judged[0].found
