@@ -26,5 +26,7 @@ def test_benchmark_gives_ratios_to_the_library_of_the_same_run():
         assert result[kind][base]["ratio"] == 1.0
         rate = result[kind]["fatigue-runner, zstd"]["per_second"]
         assert result[kind]["fatigue-runner, zstd"]["ratio"] == rate / result[kind][base]["per_second"]
+    slower = min(result[kind]["fatigue-runner, zstd"]["per_second"] for kind in ("writers", "readers"))
+    assert result["met"] is (slower >= logs.TARGET == 500_000)
     assert result["bytes_per_row"] > 8 * 38, "39 noisy float64 do not compress away"
     assert logs.table(result).row_count == 2 + len(result["writers"]) + len(result["readers"])

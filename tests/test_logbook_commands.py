@@ -79,6 +79,28 @@ def test_info_says_what_ran_how_often_it_was_accepted_and_the_extremes(log_path)
     assert "rotor_thrust" in text and "kN" in text and "campaign.yaml" in text
 
 
+def test_info_says_in_a_sentence_what_ran_and_how_close_the_guard_came(tmp_path):
+    trajectory = guarded([4])
+    trajectory.discrepancy = np.where(np.arange(10) == 4, 1.5, 0.25)
+    trajectory.threshold = np.full(10, 0.5)
+    run = {
+        "case_id": "a", "turbine": "nrel5mw", "method": "rk4", "step": "0.1", "corrector": "rk4-100ms", "mode": "hybrid",
+        "is_reference": "False", "wind_source": "turbulent", "wind_speed": "8.0", "turbulence_intensity": "0.14", "seed": "3",
+    }  # fmt: skip
+    error = np.linspace(1e-6, 1e-5, 10)
+    path = write_log(tmp_path / "a.mcap", trajectory, run, None, {"status": "done"}, reference_error=error)
+    text = logs("info", path)[1]
+    assert (
+        "rk4 at 100 ms, corrected by rk4-100ms (hybrid), on nrel5mw in turbulent wind of 8 m/s, intensity 0.14, seed 3: done"
+    ) in text
+    assert "discrepancy over threshold: median 0.5, largest 3 at 5 s" in text
+    assert "rejected 4.000 to 5.000 s (1 intervals)" in text
+    assert (
+        "error against the reference, in ranges of the states: median 5.5e-06, largest 1.0e-05 at 10 s"
+        in text
+    )
+
+
 def test_info_shows_equivalent_loads_with_their_errors_as_a_table_and_all_shows_them_as_they_are(tmp_path):
     load = "blade1_root_flapwise_moment_m10"
     result = {f"del_{load}": 4.928e6, f"del_error_{load}": -0.00123, "nrmse_edge": 0.5, "nrmse_max": 0.25}

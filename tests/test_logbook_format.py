@@ -18,7 +18,8 @@ from mcap.records import Schema
 from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
-from fatigue_runner.logbook import write_log
+from fatigue_runner import channels
+from fatigue_runner.logbook import read_log, write_log
 from fatigue_runner.logbook.generic import message_class
 from fatigue_runner.logbook.records import walk
 from fatigue_runner.logbook.schema import TOPICS, descriptor_set, fields_in
@@ -106,28 +107,45 @@ def test_rerun_finds_nothing_wrong_with_it(log_path):
 _NODE_SCRIPT = """
 const { McapIndexedReader, McapStreamReader } = require('@mcap/core');
 const { loadDecompressHandlers } = require('@mcap/support');
+const protobufjs = require('protobufjs');
+const descriptor = require('protobufjs/ext/descriptor');
 const fs = require('fs');
+// as Foxglove does: the schema is a FileDescriptorSet, its name the type of the messages
+const decoder = (schema) => {
+  const root = protobufjs.Root.fromDescriptor(descriptor.FileDescriptorSet.decode(schema.data));
+  root.resolveAll();
+  return root.lookupType(schema.name);
+};
 (async () => {
   const data = fs.readFileSync(process.argv[2]);
   const decompressHandlers = await loadDecompressHandlers();
   const readable = { size: async () => BigInt(data.length),
     read: async (o, n) => new Uint8Array(data.subarray(Number(o), Number(o + n))) };
   const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
-  let indexed = 0; for await (const m of reader.readMessages()) indexed++;
+  const types = new Map(), last = {};
+  let indexed = 0;
+  for await (const m of reader.readMessages()) {
+    indexed++;
+    const channel = reader.channelsById.get(m.channelId);
+    if (channel.messageEncoding !== 'protobuf') throw new Error(channel.messageEncoding);
+    if (!types.has(m.channelId)) types.set(m.channelId, decoder(reader.schemasById.get(channel.schemaId)));
+    const type = types.get(m.channelId);
+    last[channel.topic] = type.toObject(type.decode(m.data), { defaults: true });
+  }
   const stream = new McapStreamReader({ decompressHandlers, validateCrcs: true });
   stream.append(new Uint8Array(data));
   let streamed = 0, r; while ((r = stream.nextRecord())) if (r.type === 'Message') streamed++;
-  console.log(JSON.stringify({ indexed, streamed, done: stream.done() }));
+  console.log(JSON.stringify({ indexed, streamed, done: stream.done(), last }));
 })();
 """
 
 
 @pytest.mark.slow
-def test_the_javascript_readers_of_foxglove_accept_it(log_path, tmp_path):
+def test_the_javascript_libraries_of_foxglove_read_and_decode_it(log_path, tmp_path):
     npm, node = shutil.which("npm"), shutil.which("node")
     if not npm or not node:
         pytest.skip("npm and node are not installed")
-    packages = ["@mcap/core@2", "@mcap/support@1"]
+    packages = ["@mcap/core@2", "@mcap/support@1", "protobufjs@7"]
     command = [npm, "install", "--no-audit", "--no-fund", "--prefix", str(tmp_path), *packages]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     if done.returncode:
@@ -136,7 +154,16 @@ def test_the_javascript_readers_of_foxglove_accept_it(log_path, tmp_path):
     script.write_text(_NODE_SCRIPT)
     done = subprocess.run([node, str(script), str(log_path)], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == {"indexed": 11999, "streamed": 11999, "done": True}
+    found = json.loads(done.stdout)
+    last = found.pop("last")
+    assert found == {"indexed": 11999, "streamed": 11999, "done": True}
+    log = read_log(log_path)
+    state = last["/turbine/state"]
+    assert list(state) == ["time", *channels.STATE_NAMES]
+    assert list(state.values()) == [log.time[-1], *log.state[-1]], "to the bit"
+    assert last["/turbine/loads"] == {"time": log.time[-1]} | {k: v[-1] for k, v in log.loads.items()}
+    assert last["/wind"]["wind_speed"] == log.wind[-1, 0]
+    assert last["/solver/status"]["accepted"] == bool(log.accepted[-1])
 
 
 # --- schema

@@ -207,6 +207,7 @@ def logs(
     result = measured.benchmark_logs(rows, repeats)
     Console().print(measured.table(result))
     _write(result, json)
+    raise typer.Exit(0 if result["met"] else 1)
 
 
 @app.command()

@@ -4,9 +4,10 @@ Both cores are busy all the time, which is the worst that can happen: what the b
 The bridge opens the viewer with the end of a campaign that is as short as this one; with `at_once` it opens it as soon as the cases
 run, as in a campaign of minutes, and what that costs in seconds is what such a campaign loses.
 
-In each round every situation runs once; ratios are to the mean of the two unwatched runs of the same round, and how far those two lie
-apart is what the machine's own unrest amounts to. Sharper than the clock: how long the run's processes were ready and waited for
-a core, which Linux counts.
+In each round every situation runs once. Clocks are compared with the mean of the two unwatched runs of the same round; how far those
+two lie apart is the machine's own unrest, and on a shared one that is more than what is to be measured. So the verdict rests on what
+Linux counts: for how long the run's processes were ready and waited for a core, all together, beyond what they wait unwatched. In
+the worst case the run is slower by all of that.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from fatigue_runner.viewer import window
 from fatigue_runner.viewer.live import Look, Watcher
 from fatigue_runner.viewer.priority import yield_to_others
 
-TARGET = 1.02
+TARGET = 0.02
 ALONE = "not watched"
 AGAIN = "not watched, again"
 SITUATIONS = (ALONE, AGAIN, "viewer open", "viewer absent", "viewer stopped", "viewer killed")
@@ -79,8 +80,8 @@ def measure(
 
     duration [s]: simulated, per case; workers: processes, default as many as cores. Returns {"target", "cores", "workers",
     "rounds", "at_once", "rerun", "viewer", "met", "situations": {name: {"seconds", "ratio", "lowest", "highest", "waited",
-    "cpu_share"}}}:
-    ratio, waited [s] and cpu_share are medians over the rounds; cpu_share is what bridge and viewer took of all cores.
+    "slower", "cpu", "watching"}}}: ratio, waited [s], cpu [s] of the run's processes and the share of all cores that bridge and viewer
+    took are medians over the rounds; slower is the waiting beyond that of unwatched runs over their wall time.
     Raises InputError where Rerun is not installed.
     """
     window.require_rerun()
@@ -99,7 +100,10 @@ def measure(
         say(f"round {number + 1}: " + ", ".join(f"{name} {runs[name][-1].wall:.2f} s" for name in SITUATIONS))
     base = [(a.wall + b.wall) / 2 for a, b in zip(runs[ALONE], runs[AGAIN], strict=True)]
     situations = {name: _figures(found, base, cores) for name, found in runs.items()}
-    watched = [figures["ratio"] for name, figures in situations.items() if name.startswith("viewer")]
+    unwatched = statistics.median(run.waited for name in (ALONE, AGAIN) for run in runs[name])
+    for figures in situations.values():
+        figures["slower"] = (figures["waited"] - unwatched) / statistics.median(base)
+    watched = [figures for name, figures in situations.items() if name.startswith("viewer")]
     return {
         "target": TARGET,
         "cores": cores,
@@ -110,17 +114,19 @@ def measure(
         "viewer": {"--headless": "drawing, without a screen", "--serve-grpc": "server only"}.get(
             "".join(viewer), "window"
         ),
-        "met": max(watched) <= TARGET,
+        # where nobody counts the waiting, the clock has to do
+        "met": max(f["slower"] if unwatched else f["ratio"] - 1.0 for f in watched) <= TARGET,
         "situations": situations,
     }
 
 
 @dataclass
 class _Run:
-    """Wall time, CPU time of bridge and viewer within it, time for which the run's processes waited for a core [s]."""
+    """Wall time; CPU time of bridge and viewer, and of the run's processes, within it; time for which those waited [s]."""
 
     wall: float
     watching: float
+    cpu: float
     waited: float
 
 
@@ -132,14 +138,16 @@ def _figures(runs: list[_Run], base: list[float], cores: int) -> dict[str, Any]:
         "lowest": min(ratios),
         "highest": max(ratios),
         "waited": statistics.median(run.waited for run in runs),
-        "cpu_share": statistics.median(run.watching / (run.wall * cores) for run in runs),
+        "cpu": statistics.median(run.cpu for run in runs),
+        "watching": statistics.median(run.watching / (run.wall * cores) for run in runs),
     }
 
 
 def _run(spec: dict[str, Any], name: str, look: Look, after: float) -> _Run:
     """One run in one situation; after [s]: when something happens to the viewer."""
     with tempfile.TemporaryDirectory() as folder, _situation(name, look.viewer, after) as (port, groups):
-        waited, begin = _waited_of_group(os.getpgid(0)), time.perf_counter()
+        own = os.getpgid(0)
+        cpu, waited, begin = _cpu_of_group(own), _waited_of_group(own), time.perf_counter()
         watcher = None
         if name.startswith("viewer"):
             watcher = Watcher(replace(look, port=port))
@@ -149,13 +157,13 @@ def _run(spec: dict[str, Any], name: str, look: Look, after: float) -> _Run:
         results = run_campaign(spec, Path(folder) / "run", watch=watcher)
         wall = time.perf_counter() - begin
         used = sum(map(_cpu_of_group, groups)) - before
-        waited = _waited_of_group(os.getpgid(0)) - waited
+        cpu, waited = _cpu_of_group(own) - cpu, _waited_of_group(own) - waited
         if watcher is not None and watcher.bridge is not None:
             watcher.__exit__(None, None, None)
             _end_group(watcher.bridge.process)
         if results.exit_code:
             raise FatigueRunnerError("the campaign of this benchmark did not run to its end")
-        return _Run(wall, max(used, 0.0), waited)
+        return _Run(wall, max(used, 0.0), cpu, waited)
 
 
 @contextmanager
@@ -229,18 +237,19 @@ def table(result: dict[str, Any]) -> Any:
         title=f"A watched campaign: {result['workers']} workers on {result['cores']} cores, {result['rounds']} rounds, "
         f"Rerun {result['rerun']} ({result['viewer']})"
     )
-    for heading in ("", "wall time, s", "ratio", "lowest", "highest", "waited, s", "watching"):
-        made.add_column(heading, justify="right" if heading else "left")
+    for heading in ("", "wall, s", "ratio", "lowest", "highest", "CPU, s", "waited, s", "slower", "watching"):
+        made.add_column(heading, justify="right" if heading else "left", no_wrap=True)
     for name, figures in result["situations"].items():
         made.add_row(
             name,
             f"{statistics.median(figures['seconds']):.2f}",
             *(f"{figures[key]:.3f}" for key in ("ratio", "lowest", "highest")),
-            f"{figures['waited']:.2f}",
-            f"{figures['cpu_share']:.2%}",
+            *(f"{figures[key]:.2f}" for key in ("cpu", "waited")),
+            *(f"{figures[key]:.1%}" for key in ("slower", "watching")),
         )
     made.caption = (
-        f"ratio: to the unwatched runs of the same round, median; waited: for a core, all workers together; watching: CPU share "
-        f"of bridge and viewer. Target {result['target']:.2f}: " + ("met" if result["met"] else "missed")
+        "ratio: of the clock, to the unwatched runs of the same round; CPU, waited: the run's processes together; slower: by "
+        "waiting, at most; watching: share of all cores that bridge and viewer took. "
+        f"Slower by at most {result['target']:.0%}: " + ("met" if result["met"] else "missed")
     )
     return made

@@ -15,6 +15,7 @@ from fatigue_runner import channels
 from fatigue_runner.logbook.check import check as check_log
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.export import export as export_log
+from fatigue_runner.logbook.reader import number
 from fatigue_runner.logbook.recovery import recover as recover_log
 from fatigue_runner.logbook.summary import LogSummary, summarise
 
@@ -50,6 +51,12 @@ def info(
     summary = summarise(log)
     _print_head(console, summary, everything)
     _print_acceptance(console, summary)
+    if summary.reference_error:
+        e = summary.reference_error
+        console.print(
+            "error against the reference, in ranges of the states: "
+            f"median {e.median:.1e}, largest {e.largest:.1e} at {e.time:g} s"
+        )
     if summary.equivalent_loads and not everything:
         console.print(_equivalent_loads_table(summary))
     if summary.extremes:
@@ -65,14 +72,45 @@ def _print_head(console: Console, summary: LogSummary, everything: bool) -> None
     )
     if summary.lost:
         console.print(f"[red]damaged:[/] {escape(summary.lost)}", soft_wrap=True)
-    _print_entries(console, "run", summary.run)
+    sentence = what_ran(summary.run)
+    if sentence:
+        status = summary.result.get("status", "unfinished")
+        shade = "green" if status == "done" else "red"
+        console.print(f"{escape(sentence)}: [{shade}]{escape(status)}[/]", soft_wrap=True)
+    told = () if everything or not sentence else _TOLD
+    _print_entries(console, "run", {k: v for k, v in summary.run.items() if k not in told})
     result = summary.result
     if not everything:
-        result = {k: v for k, v in result.items() if k not in summary.run and not _is_told_elsewhere(k)}
+        known = {*summary.run, *(("status",) if sentence else ())}
+        result = {k: v for k, v in result.items() if k not in known and not _is_told_elsewhere(k)}
     _print_entries(console, "result", result)
     if summary.attachments:
         names = ", ".join(f"{name} ({size} bytes)" for name, size in summary.attachments.items())
         console.print(f"attached: {escape(names)}", soft_wrap=True)
+
+
+# Entries of `run` that the sentence of `what_ran` tells; the case's name does not, as a person copies it from there.
+_TOLD = (
+    "method", "step", "corrector", "mode", "turbine", "wind", "wind_source", "wind_speed", "turbulence_intensity", "seed",
+    "is_reference",
+)  # fmt: skip
+
+
+def what_ran(run: Mapping[str, str]) -> str:
+    """`rk4 at 100 ms, corrected by rk4-100ms (hybrid), on nrel5mw in turbulent wind of 8 m/s`; empty where a log does not say."""
+    method, step = run.get("method"), number(run, "step")
+    if not method or step is None:
+        return ""
+    words = f"{method} at {step * 1e3:g} ms"
+    if run.get("corrector"):
+        words += f", corrected by {run['corrector']} ({run.get('mode', '')})"
+    if run.get("is_reference") == "True":
+        words += ", the reference"
+    words += f", on {run.get('turbine', '?')} in {run.get('wind_source', '')} wind".replace("  ", " ")
+    speed, intensity = number(run, "wind_speed"), number(run, "turbulence_intensity")
+    words += f" of {speed:g} m/s" if speed is not None else ""
+    words += f", intensity {intensity:g}" if intensity else ""
+    return words + (f", seed {run['seed']}" if run.get("seed") else "")
 
 
 def _print_entries(console: Console, title: str, entries: Mapping[str, str]) -> None:
@@ -123,6 +161,11 @@ def _print_acceptance(console: Console, summary: LogSummary) -> None:
         console.print("acceptance: nothing was tested (no hybrid integrator)")
         return
     console.print(f"acceptance: {summary.acceptance_rate:.2%} of the intervals, {summary.rejected} rejected")
+    if summary.discrepancy:
+        d = summary.discrepancy
+        console.print(
+            f"  discrepancy over threshold: median {d.median:.2g}, largest {d.largest:.3g} at {d.time:g} s"
+        )
     for name, wind in (("accepted", summary.accepted_wind), ("rejected", summary.rejected_wind)):
         if wind:
             console.print(

@@ -47,13 +47,22 @@ class EquivalentLoad:
     error: float | None
 
 
+@dataclass(frozen=True)
+class Peak:
+    """Median and largest value of a positive quantity over the intervals, and the time of the largest [s]."""
+
+    median: float
+    largest: float
+    time: float
+
+
 @dataclass
 class LogSummary:
     """What `fatigue-runner logs info` prints.
 
     acceptance_rate: of the intervals of a guarded run, None where nothing was guarded; rejections: the
     longest stretches first; rejected_wind, accepted_wind: 5 %, 50 % and 95 % quantiles of the wind speed
-    [m/s].
+    [m/s]; discrepancy: over the threshold; reference_error: against the reference, in ranges of the state.
     """
 
     path: Path
@@ -71,6 +80,8 @@ class LogSummary:
     rejections: list[Stretch] = field(default_factory=list)
     rejected_wind: tuple[float, float, float] | None = None
     accepted_wind: tuple[float, float, float] | None = None
+    discrepancy: Peak | None = None
+    reference_error: Peak | None = None
     extremes: list[Extreme] = field(default_factory=list)
     equivalent_loads: list[EquivalentLoad] = field(default_factory=list)
 
@@ -117,6 +128,15 @@ def stretches(log: Log) -> list[Stretch]:
         mean = float(speed[begin : end + 1].mean()) if speed is not None else None
         found.append(Stretch(float(log.time[begin]), float(log.time[end]), int(end - begin), mean))
     return sorted(found, key=lambda s: (-s.intervals, s.begin))
+
+
+def peak(values: np.ndarray, time: np.ndarray) -> Peak | None:
+    """Of values per interval, `time` being their ends; None where nothing is known."""
+    known = np.isfinite(values)
+    if not known.any():
+        return None
+    top = int(np.argmax(np.where(known, values, -np.inf)))
+    return Peak(float(np.median(values[known])), float(values[top]), float(time[top]))
 
 
 def equivalent_loads(result: Mapping[str, str]) -> list[EquivalentLoad]:
@@ -166,8 +186,11 @@ def summarise(path: str | os.PathLike[str]) -> LogSummary:
         summary.acceptance_rate = float(log.accepted.mean())
         summary.rejected = int((~log.accepted).sum())
         summary.rejections = stretches(log)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            summary.discrepancy = peak(log.discrepancy / log.threshold, log.time[1:])
         if log.wind.size:
             speed = log.wind[1:, 0]
             summary.rejected_wind = _quantiles(speed[~log.accepted])
             summary.accepted_wind = _quantiles(speed[log.accepted])
+    summary.reference_error = peak(log.reference_error, log.time[1:]) if log.reference_error.size else None
     return summary
