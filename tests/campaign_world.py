@@ -81,8 +81,10 @@ def build_world(monkeypatch: Any) -> World:
     for name, module in (("integrators", integrators), ("turbine", turbines)):
         monkeypatch.setitem(sys.modules, f"fatigue_runner.{name}", module)
         monkeypatch.setattr(fatigue_runner, name, module, raising=False)
-    from fatigue_runner.campaign import block
+    from fatigue_runner.campaign import block, run
 
+    # the toy's reference is exact, and its calls are counted
+    monkeypatch.setattr(run, "reference_facts", lambda plan, earlier: {})
     block._turbine.cache_clear()
     monkeypatch.setattr(block, "_turbine", lambda source, expected_hash: turbine)
     return world

@@ -20,6 +20,9 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.logbook import read_log
 
 CAMPAIGNS = Path(__file__).parents[1] / "campaigns"
+SHIPPED = sorted(
+    set(CAMPAIGNS.glob("*.yaml")) - {CAMPAIGNS / "work_precision.yaml"}
+)  # that one is a benchmark's
 
 SMALL = {
     "name": "small",
@@ -106,7 +109,12 @@ def test_a_block_fills_the_lanes_of_the_kernel():
     assert BLOCK_SIZE % LANES == 0
 
 
-@pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_a_benchmarks_file_is_sent_to_its_command():
+    with pytest.raises(InputError, match="fatigue-runner benchmark work-precision"):
+        make_plan(CAMPAIGNS / "work_precision.yaml")
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
 def test_a_shipped_campaign_is_valid_and_its_resolved_form_means_the_same(path, tmp_path):
     plan = make_plan(path)
     assert path.stem == plan.campaign.name.replace("-", "_")

@@ -16,6 +16,7 @@ from fatigue_runner.campaign.cases import Case, blocks, code_hash, integrations,
 from fatigue_runner.campaign.source import Source, read_source
 from fatigue_runner.campaign.spec import Campaign, parse_campaign
 from fatigue_runner.campaign.store import Store
+from fatigue_runner.errors import InputError
 
 # Winds per block: the width of the lane kernel. A block is what progress counts in and what Ctrl-C can lose.
 BLOCK_SIZE = 16
@@ -78,6 +79,12 @@ def make_plan(
     """
     say("reading the campaign")
     source = read_source(campaign)
+    for key in ("cases", "benchmark"):
+        if key in source.data:
+            raise InputError(
+                f"{source.where((key,))}: the key {key!r} makes it a benchmark's file; "
+                f"run it with `fatigue-runner benchmark work-precision {source.name}`"
+            )
     spec = parse_campaign(source)
     say("loading the kernels (the first run compiles them)")
     turbine = checks.load_turbine(spec, source)

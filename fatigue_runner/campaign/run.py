@@ -14,6 +14,7 @@ from fatigue_runner.campaign.plan import Plan, make_plan, resolved_yaml, turbine
 from fatigue_runner.campaign.pool import connect, run_jobs
 from fatigue_runner.campaign.results import Results, columns
 from fatigue_runner.campaign.store import Store
+from fatigue_runner.campaign.trust import reference_facts
 from fatigue_runner.errors import FatigueRunnerError
 
 if TYPE_CHECKING:
@@ -84,7 +85,8 @@ def _simulate(
     """Run the cases that are not finished; returns how many there were."""
     from fatigue_runner import integrators
 
-    facts = about(plan.campaign.name, plan.turbine)
+    progress.say("checking the reference")
+    facts = about(plan.campaign.name, plan.turbine) | reference_facts(plan, store.earlier)
     text = resolved_yaml(plan)
     setup = Setup(
         plan.campaign,

@@ -37,6 +37,7 @@ class Store:
         self.identity = {key: identity[key] for key in _IDENTITY}
         self._fresh = fresh
         self._journal: IO[bytes] | None = None
+        self.earlier: dict[str, Any] = {}  # run.json of the run that goes on
         self._check_folder()
         self.records = {} if fresh else self._read_records()
 
@@ -108,6 +109,7 @@ class Store:
         for key, mine in self.identity.items():
             if theirs.get(key) != mine and (key == "name" or not self._fresh):
                 raise InputError(f"{self.out} {_difference(key, theirs.get(key), mine)}")
+        self.earlier = {} if self._fresh else theirs
 
     def _read_records(self) -> dict[str, dict[str, Any]]:
         """The last record of every case; a line that a crash cut off is as if it were never written."""

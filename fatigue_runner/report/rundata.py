@@ -117,6 +117,10 @@ class Run:
         }
         return [(name, value) for name, value in shown.items() if value]
 
+    def fact(self, name: str) -> str:
+        """A fact of the run by its name in run.json; empty where it is unknown."""
+        return str((self._facts or self._facts_of_a_log()).get(name, ""))
+
     def _facts_of_a_log(self) -> dict[str, str]:
         logs = (self.log(text(row, "case_id")) for row in self.rows[:20])
         return next((dict(log.run) for log in logs if log is not None), {})

@@ -88,9 +88,11 @@ def _channels(run: Run) -> str:
 def _reference(run: Run) -> str:
     if run.reference is None:
         return "None was run."
+    agreement = run.fact("reference_agreement")
     return (
         f"{run.reference.label}: the same wind, initial state, turbine and compiled kernel; only the "
-        "integrator differs. What the reference itself gets wrong is in no figure here."
+        "integrator differs. What the reference itself gets wrong is in no figure here"
+        + (f"; how far it can be trusted: {agreement}." if agreement else ".")
     )
 
 

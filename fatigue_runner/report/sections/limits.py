@@ -7,12 +7,13 @@ from fatigue_runner.report.cells import Row, format_percent, number, text
 from fatigue_runner.report.rundata import Run
 
 ORDER = 20
+NEAR = 10.0  # times what is known of the reference: errors below are its own as likely as the integrator's
 SHORT = 600.0  # s; the length of a load case in IEC 61400-1
 
 
 def build(run: Run) -> Section | None:
     """The warnings of this run; None where there are none."""
-    items = [*_clamped(run), *_lost(run), *_uncompared(run), *_short(run), *_folder(run)]
+    items = [*_clamped(run), *_lost(run), *_uncompared(run), *_unresolved(run), *_short(run), *_folder(run)]
     return Section("What limits this result", [Warnings(items)]) if items else None
 
 
@@ -67,6 +68,22 @@ def _uncompared(run: Run) -> list[str]:
     if not run.reference.complete:
         return ["The reference did not finish every wind; where it is missing, no integrator was compared."]
     return []
+
+
+def _unresolved(run: Run) -> list[str]:
+    """Integrators whose errors are not far above what is known of the reference's own."""
+    try:
+        known = float(run.fact("reference_nrmse"))
+    except ValueError:
+        return []
+    near = [s for s in run.integrators if s.nrmse_median is not None and s.nrmse_median < NEAR * known]
+    if not near:
+        return []
+    return [
+        f"The reference is known to an NRMSE of {known:.0e} only ({run.fact('reference_agreement')}). The errors of "
+        f"{', '.join(s.label for s in near)} are less than {NEAR:g} times that and may be the reference's own: give the reference "
+        "a smaller step."
+    ]
 
 
 def _short(run: Run) -> list[str]:
