@@ -91,6 +91,18 @@ def test_a_tables_rows_are_of_the_chosen_winds(measured):
     assert row["delta_e_range"] == {"low": value, "median": value, "high": value, "worst": value}
 
 
+def test_the_page_says_which_of_the_papers_claims_hold(measured, tmp_path):
+    # a network of zeros is Heun, dearer than RK3 at its error; its hybrid is RK3, so nowhere worse
+    claims = paper.judged(measured, measured)
+    hybrid = [t for t in claims if "hybrid" in t.asked]
+    assert [t.reached for t in hybrid] == [True] * len(paper.BOXED) and "0 of 3 winds" in hybrid[0].found
+    written = paper.page(measured, measured, tmp_path).read_text(encoding="utf-8")
+    assert all(str(t) in written for t in claims)
+    assert all(
+        (tmp_path / "images" / name).is_file() for name in ("paper-boxes.png", "paper-work-precision.png")
+    )
+
+
 def test_the_figures_are_drawn_and_the_measurements_are_plain_json(measured, tmp_path):
     paths = draw(measured, measured, tmp_path)
     assert [p.name for p in paths] == ["paper-work-precision.png", "paper-boxes.png"]

@@ -50,7 +50,7 @@ class Settings(Section):
     tolerances: list[Positive] = Field(default=[1e-3, 1e-4, 1e-5, 1e-6, 1e-7])
     adaptive_cases: int = Field(default=4, ge=0)
     rounds: int = Field(default=7, ge=1)
-    timed_evaluations: Positive = 12_000.0
+    timed_evaluations: Positive = 20_000.0
 
     @field_validator("methods")
     @classmethod

@@ -147,7 +147,8 @@ def paper(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder for the figures.", show_default=False)
+        Path | None,
+        typer.Option("--out", "-o", help="Folder for the page and its figures.", show_default=False),
     ] = None,
     json: Json = None,
 ) -> None:
@@ -155,17 +156,16 @@ def paper(
 
     Example:
 
-        fatigue-runner benchmark paper --out docs/images
+        fatigue-runner benchmark paper --out docs
     """
     from fatigue_runner.benchmark import paper as measured
-    from fatigue_runner.benchmark import paper_figures
 
     results = measured.both(correctors or None, _say)
     for result in results:
         typer.echo("\n".join(measured.text(result)) + "\n")
+    typer.echo("\n".join(f"- {target}" for target in measured.judged(*results)))
     if out is not None:
-        for path in paper_figures.draw(*results, out):
-            typer.echo(f"figure: {path}")
+        typer.echo(f"page: {measured.page(*results, out)}")
     _write([measured.to_json(r) for r in results], json)
 
 

@@ -96,7 +96,11 @@ def write(result: dict[str, Any], folder: Path, images: Path) -> Path:
     names = figures.write(result["cases"], images)
     where = os.path.relpath(images, folder)
     lines = ["# Error over cost of every integrator", "", *_how(result)]
-    lines += [f"![{name.removesuffix('.png')}]({where}/{name})\n" for name in names[:2]]
+    lines += ["## In words", "", "By measured time:", ""]
+    for part in result["cases"]:
+        said = "\n".join(f"  - {sentence}" for sentence in answers.summary(part)["in_words"])
+        lines += [f"- {part['cases'].capitalize()} (`{part['turbine']}`):", said]
+    lines += ["", *[f"![{name.removesuffix('.png')}]({where}/{name})\n" for name in names[:2]]]
     for part in result["cases"]:
         lines += [*text.cases(part), ""]
     lines += ["## Stability limits", "", f"![{names[2]}]({where}/{names[2]})", ""]

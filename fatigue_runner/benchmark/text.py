@@ -79,7 +79,8 @@ def winds(result: dict[str, Any]) -> str:
     """What the cases are."""
     kind = "turbulent" if result["turbulent"] else "constant"
     less = f", the first {result['discard']:g} s discarded" if result.get("discard") else ""
-    return f"{len(result['winds'])} cases of {kind} wind, {result['duration']:g} s{less}, on `{result['turbine']}`."
+    rate = f"{result['output_rate']:g} Hz"
+    return f"{len(result['winds'])} cases of {kind} wind, {result['duration']:g} s{less}, on `{result['turbine']}`, output at {rate}."
 
 
 def trust(result: dict[str, Any]) -> str:

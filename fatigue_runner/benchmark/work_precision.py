@@ -165,6 +165,7 @@ def _empty(cases: Cases, settings: Settings) -> dict[str, Any]:
         "winds": [w.name for w in cases.winds],
         "duration": cases.duration,
         "discard": cases.discard,
+        "output_rate": 1.0 / cases.output_step,
         "reference": {"method": method, "step": step, "agreement": []},
         "points": [],
         "adaptive": [],
