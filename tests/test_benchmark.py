@@ -259,6 +259,13 @@ def test_json_holds_every_point_with_plain_values(monkeypatch, tmp_path, timed):
     assert found["summary"]["answers"][0]["target"] == "NRMSE 1e-02"
 
 
+def test_a_folder_that_cannot_be_written_is_said_in_one_sentence(monkeypatch, tmp_path, timed):
+    monkeypatch.setattr(page, "measure", lambda *arguments, **named: timed)
+    (tmp_path / "file").write_text("")
+    done = CliRunner().invoke(app, ["work-precision", "--out", str(tmp_path / "file")])
+    assert isinstance(done.exception, InputError) and "give --out another folder" in str(done.exception)
+
+
 def test_a_file_that_is_no_earlier_run_is_refused(tmp_path):
     done = CliRunner().invoke(app, ["work-precision", "--reuse", str(tmp_path / "none.json")])
     assert isinstance(done.exception, InputError) and "is not the JSON of an earlier run" in str(

@@ -105,7 +105,11 @@ def test_the_page_says_which_of_the_papers_claims_hold(measured, tmp_path):
 
 def test_the_figures_are_drawn_and_the_measurements_are_plain_json(measured, tmp_path):
     paths = draw(measured, measured, tmp_path)
-    assert [p.name for p in paths] == ["paper-work-precision.png", "paper-boxes.png"]
+    assert [p.name for p in paths] == [
+        "paper-work-precision.png",
+        "paper-boxes.png",
+        "paper-boxes-delta-e.png",
+    ]
     assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)
     again = json.loads(json.dumps(paper.to_json(measured)))
     assert again["outcomes"][0]["delta_e_range"] == measured["outcomes"][0].delta_e_range

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -44,6 +45,18 @@ def _read(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"{path} is not the JSON of an earlier run ({error})") from None
+
+
+def _written(write: Callable[..., Path], folder: Path, *arguments: Any) -> Path:
+    """What `write` returns. Raises InputError where `folder` cannot be written."""
+    from fatigue_runner.errors import InputError
+
+    try:
+        return write(*arguments)
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be written ({error.strerror}); give --out another folder"
+        ) from None
 
 
 def _say(what: str) -> None:
@@ -133,7 +146,7 @@ def work_precision(
     for part in result["cases"]:
         typer.echo("\n".join(text.cases(part)) + "\n")
     if out is not None:
-        typer.echo(f"page: {page.write(result, out, out / 'images')}")
+        typer.echo(f"page: {_written(page.write, out, result, out, out / 'images')}")
     _write(result, json)
 
 
@@ -165,7 +178,7 @@ def paper(
         typer.echo("\n".join(measured.text(result)) + "\n")
     typer.echo("\n".join(f"- {target}" for target in measured.judged(*results)))
     if out is not None:
-        typer.echo(f"page: {measured.page(*results, out)}")
+        typer.echo(f"page: {_written(measured.page, out, *results, out)}")
     _write([measured.to_json(r) for r in results], json)
 
 

@@ -256,7 +256,8 @@ def page(inside: dict[str, Any], outside: dict[str, Any], folder: Path) -> Path:
         *[f"- {t}" for t in judged(inside, outside)],
         "",
         *[f"![{f.stem}](images/{f.name})\n" for f in figures],
-        "Boxes: quartiles and median over the winds, whiskers to the least and the largest.",
+        "Boxes: quartiles and median over the winds, whiskers to the least and the largest; δ_e,range, then δ_e as the paper writes "
+        "it, which divides by |x| and is ruled by zero crossings.",
         "",
         *text(inside),
         "",

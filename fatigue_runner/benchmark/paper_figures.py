@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NAMES = {"heun": "Heun", "rk3": "RK3", "heun-richardson": "Heun + Richardson"}
-ERROR = r"$\delta_{e,\mathrm{range}}$"
+ERRORS = {"delta_e_range": r"$\delta_{e,\mathrm{range}}$", "delta_e": r"$\delta_e$"}
 
 
 def name(label: str) -> str:
@@ -54,14 +54,14 @@ def work_precision(measured: dict[str, Any]) -> Figure:
     ):
         axes.set(xscale="log", yscale="log", title=title, xlabel=x_label)
         axes.grid(True)
-    left.set_ylabel(f"median {ERROR}")
+    left.set_ylabel(f"median {ERRORS['delta_e_range']}")
     handles, labels = left.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure
 
 
-def boxes(in_range: dict[str, Any], out_of_range: dict[str, Any]) -> Figure:
-    """Box plots of delta_e_range over the measured time (delta_t): in range and out of range, at 10 and at 5 ms."""
+def boxes(in_range: dict[str, Any], out_of_range: dict[str, Any], error: str = "delta_e_range") -> Figure:
+    """Box plots of delta_e_range, or of the paper's delta_e, over the measured time (delta_t): in and out of range, at 10 and 5 ms."""
     from matplotlib.patches import Patch
 
     from fatigue_runner.report.style import new_figure
@@ -73,9 +73,9 @@ def boxes(in_range: dict[str, Any], out_of_range: dict[str, Any]) -> Figure:
         for axes, measured in zip(row, (in_range, out_of_range), strict=True):
             speeds = measured["speeds"]
             text = f"{step * 1e3:g} ms, {len(speeds)} winds in {min(speeds):.0f} to {max(speeds):.0f} m/s"
-            _boxes(axes, [o for o in measured["outcomes"] if o.step == step], look)
+            _boxes(axes, [o for o in measured["outcomes"] if o.step == step], look, error)
             axes.set_title(text)
-        row[0].set_ylabel(ERROR)
+        row[0].set_ylabel(ERRORS[error])
     for axes in grid[-1]:
         axes.set_xlabel("δt: processor time per simulated second [µs]")
     handles = [Patch(facecolor=c + "55", edgecolor=c, label=name(label)) for label, (c, _) in look.items()]
@@ -83,13 +83,13 @@ def boxes(in_range: dict[str, Any], out_of_range: dict[str, Any]) -> Figure:
     return figure
 
 
-def _boxes(axes: Axes, outcomes: Sequence[Outcome], look: dict[str, tuple[str, str]]) -> None:
+def _boxes(axes: Axes, outcomes: Sequence[Outcome], look: dict[str, tuple[str, str]], error: str) -> None:
     """A box per integrator where its cost is; whiskers to the least and the largest."""
     from fatigue_runner.report.style import INK, plain_logarithm
 
     axes.set(xscale="log", yscale="log")
     for o in outcomes:
-        values = o.values("delta_e_range")
+        values = o.values(error)
         if not values.size:
             continue
         at = o.wall * 1e6
@@ -108,7 +108,7 @@ def _boxes(axes: Axes, outcomes: Sequence[Outcome], look: dict[str, tuple[str, s
 
 
 def draw(in_range: dict[str, Any], out_of_range: dict[str, Any], folder: Path) -> list[Path]:
-    """Write paper-work-precision.png and paper-boxes.png; the paths."""
+    """Write paper-work-precision.png, paper-boxes.png and paper-boxes-delta-e.png; the paths."""
     from fatigue_runner.report.style import styled
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -117,6 +117,7 @@ def draw(in_range: dict[str, Any], out_of_range: dict[str, Any], folder: Path) -
         for file, figure in (
             ("paper-work-precision", work_precision(in_range)),
             ("paper-boxes", boxes(in_range, out_of_range)),
+            ("paper-boxes-delta-e", boxes(in_range, out_of_range, "delta_e")),
         ):
             written.append(folder / f"{file}.png")
             figure.savefig(written[-1], dpi=160, metadata={"Software": None})
