@@ -51,6 +51,18 @@ def test_reference_stands_first_and_every_turbine_has_its_own_place_and_colour(r
     assert (np.abs(np.diff(offsets)) > 2 * 63).all(), "rotors do not touch"
 
 
+def test_correctors_of_one_method_are_told_apart_by_their_names(tmp_path):
+    made = [
+        write(tmp_path / name, "rk3", mode="hybrid", corrector=name, case_id=name)
+        for name in ("affine", "network")
+    ]
+    assert [v.label for v in cases.read_cases(made)] == [
+        "rk3, 20 ms + affine (hybrid)",
+        "rk3, 20 ms + network (hybrid)",
+    ]
+    assert [v.label for v in cases.read_cases(made[:1])] == ["rk3, 20 ms (hybrid)"]
+
+
 def test_log_of_another_turbine_is_refused(tmp_path):
     path = write(tmp_path, rows=20)
     with pytest.raises(InputError, match="made with another turbine than nrel5mw"):
@@ -184,8 +196,16 @@ class TestWithRerun:
         monkeypatch.setattr(recording, "FRAME_RATE", 5.0)
         rows = sent(write(tmp_path, rows=1201))  # 60 s at 20 Hz
         assert rows["plots/load/tower_base_fore_aft_moment"] == rows["plots/state/edge"] == 1201
-        assert rows["plots/solver/discrepancy"] == rows["plots/solver/accepted"] == 1200
+        assert rows["plots/solver/discrepancy"] == 1200
+        assert (rows["plots/solver/accepted"], rows["plots/solver/fallen_back"]) == (800, 400)
         assert rows["scene/blade1"] == rows["scene/hub"] == 301
+
+    def test_live_view_forwards_at_most_its_rate_and_the_largest_error_of_each_group(self, tmp_path):
+        every = sent(write(tmp_path, rows=1201))  # 60 s at 20 Hz
+        few = sent(write(tmp_path, rows=1201), series_rate=5.0)
+        assert every["plots/load/rotor_thrust"] == 1201 and few["plots/load/rotor_thrust"] == 301
+        assert few["plots/solver/discrepancy"] == 300
+        assert few["plots/solver/fallen_back"] == every["plots/solver/fallen_back"], "no rejection is lost"
 
     @given(st.lists(st.integers(0, 150), max_size=5).map(sorted))
     @settings(max_examples=6, deadline=None)
@@ -246,13 +266,13 @@ class Sent:
         self.blocks[path] = self.blocks.get(path, 0) + 1
 
 
-def sent(path: Path, cuts: tuple[int, ...] = ()) -> dict[str, int]:
+def sent(path: Path, cuts: tuple[int, ...] = (), series_rate: float | None = None) -> dict[str, int]:
     """Rows sent of a log, by entity without the case's key, when it is sent in pieces that end at `cuts`."""
     from fatigue_runner.viewer.recording import Stage
 
     viewed = cases.read_cases([path])
     counter = Sent()
-    stage = Stage(counter, viewed)
+    stage = Stage(counter, viewed, series_rate=series_rate)
     stage.set_up()
     for first, last in zip((0, *cuts), (*cuts, None), strict=True):
         stage.send(viewed[0], first, last)

@@ -88,6 +88,16 @@ def test_chart_has_a_point_per_case_that_is_done_at_its_wind_and_load(tmp_path):
     # equal steps in wind and in load are equal steps to the right and up
     assert np.diff(points[:, 0]) == pytest.approx(np.diff(points[:, 0])[::-1])
     assert (np.diff(points[:, 1]) < 0).all()
+    append(
+        tmp_path,
+        *(
+            record(name, corrector=name, mode="hybrid", wind_speed=9, **{name: 1.0})
+            for name in ("affine", "network")
+        ),
+    )
+    view.update()
+    for name in ("affine", "network"):
+        assert f"| heun, 10 ms + {name} (hybrid) | 1 |" in view.text(), "two correctors are two integrators"
     assert "worst DEL error" in view.text() and "| heun, 10 ms | 4 | 1.0e-01 |" in view.text()
 
 

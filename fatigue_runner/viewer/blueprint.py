@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 
 from fatigue_runner import channels
 from fatigue_runner.viewer.cases import Viewed
-from fatigue_runner.viewer.recording import TIMELINE
+from fatigue_runner.viewer.recording import TIMELINE, band_lane
 from fatigue_runner.viewer.styles import read_unit
 
 LONGEST_WHOLE = 180.0  # s; oscillations of a longer log would be a solid band
@@ -86,19 +86,29 @@ def overview(cases: Sequence[Viewed]) -> rrb.Container:
         _plot("Blade root flapwise moment [MN·m]", cases, _blades("load", "root_flapwise_moment", cases)),
         _plot("Tower-base fore-aft moment [MN·m]", cases, ["load/tower_base_fore_aft_moment"]),
     ]
-    solver = _solver_plots(cases)
-    if len(cases) > 1 and any(_has(case, "reference_error") for case in cases):
-        # Curves of good integrators lie on each other; their errors do not.
-        solver = [_error_plot(cases), *solver[: int(any(case.is_guarded for case in cases))]]
-    plots += solver[:2]
-    if len(plots) < 4:
-        plots.append(_plot("Wind speed at the hub [m/s]", cases[:1], ["wind/wind_speed"]))
-    if len(plots) < 4:
-        plots.append(_plot("Rotor speed [rpm]", cases, ["state/rotor_speed"]))
     if len(cases) == 1:
-        return rrb.Horizontal(scene_view(cases), rrb.Vertical(*plots), column_shares=[3, 2], name="Turbine")
+        solver, shares = _solver_plots(cases)[:3], [3.0, 3.0]
+        plots += solver
+        shares += [1.6 if place == 0 and cases[0].is_guarded else 2.4 for place in range(len(solver))]
+        while len(plots) < 4:
+            plots.append(_more_plots(cases)[len(plots) - 2])
+            shares.append(2.4)
+        beside = rrb.Vertical(*plots, row_shares=shares)
+        return rrb.Horizontal(scene_view(cases), beside, column_shares=[3, 2], name="Turbine")
+    # Curves of good integrators lie on each other; their errors do not.
+    if any(_has(case, "reference_error") for case in cases):
+        plots.append(_error_plot(cases))
+    plots += [*_guard_plots(cases)[:1], *_more_plots(cases)][: 4 - len(plots)]
     rows = [rrb.Horizontal(*plots[i : i + 2]) for i in (0, 2)]
     return rrb.Vertical(scene_view(cases), *rows, row_shares=[5, 3, 3], name="Turbines")
+
+
+def _more_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
+    """What fills the first screen where the solver has little to tell."""
+    return [
+        _plot("Wind speed at the hub [m/s]", cases[:1], ["wind/wind_speed"]),
+        _plot("Rotor speed [rpm]", cases, ["state/rotor_speed"]),
+    ]
 
 
 def scene_view(cases: Sequence[Viewed]) -> rrb.Spatial3DView:
@@ -155,26 +165,30 @@ def _blades(group: str, what: str, cases: Sequence[Viewed]) -> list[str]:
 
 def _solver_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
     """Only those for which a case holds figures."""
-    plots = []
-    guarded = [case for case in cases if case.is_guarded]
-    if guarded:
-        plots.append(
-            _plot(
-                "Network trusted: accepted (green, 1) or fallen back (red, 0)",
-                guarded,
-                ["solver/accepted"],
-                (-0.4, 1.4),
-            )
-        )
-        plots.append(
-            _plot("log10 of discrepancy and threshold", guarded, ["solver/discrepancy", "solver/threshold"])
-        )
+    plots = _guard_plots(cases)
     if any(_has(case, "reference_error") for case in cases):
         plots.append(_error_plot(cases))
     holding = [case for case in cases if _has(case, "local_error")]
     if holding:
         plots.append(_plot("log10 of the local error estimate", holding, ["solver/local_error"]))
     return plots
+
+
+def _guard_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
+    """Where the corrector was trusted, and by what margin, of the hybrid integrators."""
+    guarded = [case for case in cases if case.is_guarded]
+    if not guarded:
+        return []
+    lowest, highest = band_lane(len(guarded) - 1)[0], band_lane(0)[1]
+    return [
+        _plot(
+            "Corrector trusted, or fallen back (below, red)",
+            guarded,
+            ["solver/accepted", "solver/fallen_back"],
+            (lowest - 0.5, highest + 0.5),
+        ),
+        _plot("log10 of discrepancy and threshold", guarded, ["solver/discrepancy", "solver/threshold"]),
+    ]
 
 
 def _error_plot(cases: Sequence[Viewed]) -> rrb.TimeSeriesView:

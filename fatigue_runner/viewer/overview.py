@@ -114,8 +114,9 @@ class Overview:
 def integrator(row: dict[str, Any]) -> str:
     """As a person calls the integrator of a row of the results."""
     name = f"{row.get('method')}, {(row.get('step') or 0) * 1e3:g} ms"
-    extra = row.get("mode") if row.get("corrector") else ("reference" if row.get("is_reference") else None)
-    return f"{name} ({extra})" if extra else name
+    if row.get("corrector"):
+        return f"{name} + {row['corrector']} ({row.get('mode')})"
+    return f"{name} (reference)" if row.get("is_reference") else name
 
 
 @dataclass

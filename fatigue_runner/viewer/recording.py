@@ -242,23 +242,24 @@ class Stage:
             self._send_band(case, within)
 
     def _send_band(self, case: Viewed, within: slice) -> None:
-        """One mark per group of steps, red when any of them fell back."""
+        """One mark per group of steps in the case's lane, a lower one when any of them fell back."""
         starts = _starts(within, max(1, int(np.ceil(len(case.log.accepted) / BAND_POINTS))))
         time = case.log.time[within.start + 1 : within.stop + 1][starts]
-        good = np.minimum.reduceat(case.log.accepted[within].astype(np.uint8), starts)
-        shade = np.where(good[:, None] > 0, [*colours.ACCEPTED, 255], [*colours.REJECTED, 255]).astype(
-            np.uint8
-        )
-        self._columns(
-            f"plots/solver/accepted/{case.key}",
-            time,
-            rr.Scalars.columns(scalars=good.astype(float)),
-            rr.SeriesPoints.columns(colors=colours.packed(shade)),
-        )
+        good = np.minimum.reduceat(case.log.accepted[within].astype(np.uint8), starts) > 0
+        lane = band_lane([other.key for other in self.cases if other.is_guarded].index(case.key))
+        for name, which, height in (("accepted", good, lane[1]), ("fallen_back", ~good, lane[0])):
+            self._series(
+                f"plots/solver/{name}/{case.key}", time[which], np.full(int(which.sum()), float(height))
+            )
 
     def _series(self, path: str, time: np.ndarray, values: np.ndarray) -> None:
         if len(values):
             self._columns(path, time, rr.Scalars.columns(scalars=np.asarray(values, float)))
+
+
+def band_lane(number: int) -> tuple[float, float]:
+    """Heights of the marks (fallen back, accepted) of the n-th guarded case in the plot of acceptance, from the top."""
+    return -2.0 * number, 1.0 - 2.0 * number
 
 
 def nanoseconds(time: np.ndarray) -> np.ndarray:

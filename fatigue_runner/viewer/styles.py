@@ -31,20 +31,34 @@ def set_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> Non
             colour = colours.BLADES[blade - 1] if blade else colours.INTEGRATORS[0]
         style = rr.SeriesLines(names=name, colors=colour, widths=1.6 if not case.is_reference else 2.6)
         recording.log(f"plots/{group}/{channel.name}/{case.key}", style, static=True)
-    for name, what, colour in (
-        ("discrepancy", "discrepancy", case.colour), ("threshold", "threshold", colours.REJECTED),
-        ("local_error", "local error estimate", case.colour), ("reference_error", "error", case.colour),
+    # what shares no plot with another series of the same case needs no more than the case's name
+    for name, what, alone, colour in (
+        ("discrepancy", "discrepancy", False, case.colour), ("threshold", "threshold", False, colours.REJECTED),
+        ("local_error", "local error estimate", True, case.colour), ("reference_error", "error", True, case.colour),
     ):  # fmt: skip
         recording.log(
             f"plots/solver/{name}/{case.key}",
-            rr.SeriesLines(names=f"{case.label}: {what}" if several else what, colors=colour, widths=1.6),
+            rr.SeriesLines(names=_name(case, what, several, alone), colors=colour, widths=1.6),
             static=True,
         )
     if case.is_guarded:
-        recording.log(
-            f"plots/solver/accepted/{case.key}",
-            rr.SeriesPoints(
-                names=f"{case.label}: accepted" if several else "accepted", markers="square", marker_sizes=7.0
-            ),
-            static=True,
-        )
+        trusted = case.colour if several else colours.ACCEPTED
+        for name, what, alone, colour in (
+            ("accepted", "accepted", True, trusted), ("fallen_back", "fallen back", False, colours.REJECTED),
+        ):  # fmt: skip
+            recording.log(
+                f"plots/solver/{name}/{case.key}",
+                rr.SeriesPoints(
+                    names=_name(case, what, several, alone),
+                    colors=colour,
+                    markers="square",
+                    marker_sizes=7.0,
+                ),
+                static=True,
+            )
+
+
+def _name(case: Viewed, what: str, several: bool, alone: bool) -> str:
+    if not several:
+        return what
+    return case.label if alone else f"{case.label}: {what}"

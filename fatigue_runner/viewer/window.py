@@ -84,7 +84,7 @@ def write_recording(path: Path, cases: Sequence[Any], scale: float = 1.0, playin
         for case in cases:
             stage.send(case)
         recording.flush(timeout_sec=_WRITE_SECONDS)
-    except (OSError, RuntimeError, ValueError) as error:
+    except (OSError, RuntimeError) as error:
         raise InputError(f"{path} cannot be written: {' '.join(str(error).split())}") from None
     finally:
         recording.disconnect()
