@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -267,6 +269,24 @@ def test_check_names_the_kind_of_record_that_is_damaged(whole, tmp_path, kind, p
     path = tmp_path / "damaged.mcap"
     path.write_bytes(data)
     assert any(problem in found for found in check(path).problems)
+
+
+def test_check_finds_a_signed_chunk_without_a_message(tmp_path):
+    """As a program may write it that filters messages out: the checksum is right, and nothing is inside."""
+    path = write_log(tmp_path / "a.mcap", example(ROWS), compression="none")
+    data = bytearray(path.read_bytes())
+    chunk = next(r for r in walk(bytes(data)) if r.opcode == Opcode.CHUNK)
+    begin = chunk.end - struct.unpack_from("<Q", data, chunk.start + 9 + 16)[0]
+    at = begin
+    while at < chunk.end:
+        data[at] = 0x80  # an opcode of no meaning
+        at += 9 + struct.unpack_from("<Q", data, at + 1)[0]
+    struct.pack_into("<I", data, chunk.start + 9 + 24, zlib.crc32(data[begin : chunk.end]))
+    path.write_bytes(data)
+    assert not check(path).ok
+    for partial in (False, True):
+        with pytest.raises(LogError):
+            read_log(path, partial=partial)
 
 
 def test_check_finds_times_that_go_backwards(tmp_path):

@@ -79,7 +79,7 @@ def measure(
     """Wall time of the campaign in every situation of `SITUATIONS`, in turn.
 
     duration [s]: simulated, per case; workers: processes, default as many as cores. Returns {"target", "cores", "workers",
-    "rounds", "at_once", "rerun", "viewer", "met", "situations": {name: {"seconds", "ratio", "lowest", "highest", "waited",
+    "rounds", "at_once", "rerun", "viewer", "disturbed", "met", "situations": {name: {"seconds", "ratio", "lowest", "highest", "waited",
     "slower", "cpu", "watching"}}}: ratio, waited [s], cpu [s] of the run's processes and the share of all cores that bridge and viewer
     took are medians over the rounds; slower is the waiting beyond that of unwatched runs over their wall time.
     Raises InputError where Rerun is not installed.
@@ -114,6 +114,8 @@ def measure(
         "viewer": {"--headless": "drawing, without a screen", "--serve-grpc": "server only"}.get(
             "".join(viewer), "window"
         ),
+        # by itself a run waits for a twentieth of its time
+        "disturbed": unwatched > 0.15 * statistics.median(base),
         # where nobody counts the waiting, the clock has to do
         "met": max(f["slower"] if unwatched else f["ratio"] - 1.0 for f in watched) <= TARGET,
         "situations": situations,

@@ -31,7 +31,8 @@ from fatigue_runner.logbook.records import (
 class Check:
     """What a check found: `problems` in the order of the file, and how much the file holds.
 
-    complete: it also has its result and all of its rows, which a repaired log may lack without any problem.
+    complete: it also has its result and all of its rows, which a repaired log may lack without any problem. ours: this
+    program wrote the file, so that also missing rows are found.
     """
 
     path: Path
@@ -40,6 +41,7 @@ class Check:
     messages: int = 0
     rows: int = 0
     complete: bool = False
+    ours: bool = True
 
     @property
     def ok(self) -> bool:
@@ -58,7 +60,7 @@ class MessageOrder:
 
     def problem(self, entries: dict[int, np.ndarray]) -> str | None:
         """What is wrong with a chunk's (n, 3) entries after the chunks before it, None for nothing."""
-        if self._from_row_0 and not self._last and min(e[0, 2] for e in entries.values()) > 0:
+        if self._from_row_0 and not self._last and min((e[0, 2] for e in entries.values()), default=0) > 0:
             return "rows are missing"
         for channel_id, found in entries.items():
             log_time, sequence = found[:, 0], found[:, 2].astype(np.int64)
@@ -192,5 +194,6 @@ def check(path: str | os.PathLike[str]) -> Check:
     found.chunks = expected.statistics.chunk_count
     found.messages = expected.statistics.message_count
     found.rows = order.rows if contents.ours else 0
+    found.ours = contents.ours
     found.complete = found.ok and rows == str(found.rows)
     return found

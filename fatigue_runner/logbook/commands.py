@@ -29,6 +29,7 @@ app = typer.Typer(
 LogPath = Annotated[Path, typer.Argument(help="A log (.mcap).", show_default=False)]
 # Stretches of rejected steps that `info` lists; the longest tell most.
 _SHOWN_STRETCHES = 8
+_SHOWN_PROBLEMS = 4  # of a file, by `check`
 _WIDTH = 130
 
 
@@ -218,14 +219,17 @@ def check(
             damaged += 1
             continue
         if found.ok:
-            state = "" if found.complete else ", but without the end of its run"
-            what = f"{found.chunks} chunks, {found.messages} messages, {found.rows} rows{state}"
+            what = f"{found.chunks} chunks, {found.messages} messages, {found.rows} rows"
+            if not found.ours:
+                what = f"{found.chunks} chunks, {found.messages} messages, of another program"
+            elif not found.complete:
+                what += ", but without the end of its run"
             console.print(f"[green]good[/]  {escape(str(path))}: {what}", soft_wrap=True)
             continue
         damaged += 1
-        console.print(
-            f"[red]wrong[/] {escape(str(path))}: {escape('; '.join(found.problems))}", soft_wrap=True
-        )
+        told = found.problems[:_SHOWN_PROBLEMS]
+        more = f"; and {len(found.problems) - len(told)} more" if len(found.problems) > len(told) else ""
+        console.print(f"[red]wrong[/] {escape(str(path))}: {escape('; '.join(told))}{more}", soft_wrap=True)
     if damaged:
         console.print("`fatigue-runner logs recover FILE` keeps what is good of a damaged log")
         raise typer.Exit(1)
