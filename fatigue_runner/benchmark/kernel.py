@@ -53,10 +53,10 @@ def scalar_kernel() -> Callable[..., None]:
 
     source = inspect.getsource(kernel).replace(f"LANES = {kernel.LANES}\n", "LANES = 1\n", 1)
     # without a file there is nothing to cache: it is compiled anew in every benchmark
-    source = source.replace("from fatigue_runner.compiled import FAST, njit", "from numba import njit")
-    from fatigue_runner.compiled import FAST
+    source = source.replace("from fatigue_runner.compiled import INLINE, njit", "from numba import njit")
+    from fatigue_runner.compiled import INLINE
 
-    space: dict[str, Any] = {"FAST": FAST, "__name__": "scalar_kernel"}
+    space: dict[str, Any] = {"INLINE": INLINE, "__name__": "scalar_kernel"}
     exec(compile(source, "<scalar kernel>", "exec"), space)
     return space["rhs"]
 

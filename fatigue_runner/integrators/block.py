@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -67,7 +68,10 @@ def simulate_block(
 
 @dataclass
 class _Group:
-    """What the loop left of one group: rows (n, 16 * LANES), errors (n - 1, LANES), per lane: diverged_at, clamped."""
+    """What the loop left of one group: rows (n, 16 * LANES), errors (n - 1, LANES), per lane: diverged_at, clamped.
+
+    `rows` is written anew by the next group.
+    """
 
     rows: Array
     errors: Array
@@ -85,6 +89,20 @@ def aligned(values: NDArray[Any]) -> NDArray[Any]:
     out = room[begin : begin + values.nbytes].view(values.dtype).reshape(values.shape)
     out[...] = values
     return out
+
+
+_kept = threading.local()
+_MOST_KEPT = 2**27  # bytes
+
+
+def _output_rows(count: int, width: int) -> Array:
+    """(count, width) to write output to, the same memory again and again: a new page costs as much as a step (measured)."""
+    size = count * width
+    rows: Array | None = getattr(_kept, "rows", None)
+    if rows is None or len(rows) < size:
+        rows = np.empty(size)
+        _kept.rows = rows if rows.nbytes <= _MOST_KEPT else None
+    return rows[:size].reshape(count, width)
 
 
 def _run(turbine, method, correcting, step, steps, winds, initial, plan, pitch) -> list[Trajectory]:
@@ -170,7 +188,7 @@ def _run_group(
     k = aligned(np.zeros((slopes, width)))
     work = (states, k, aligned(np.zeros(3 * LANES)), *flat, aligned(start))
     group = _Group(
-        np.empty((len(plan.time), width)),
+        _output_rows(len(plan.time), width),
         np.full((len(plan.time) - 1, LANES), np.nan),
         np.where(fine, -1.0, 0.0),
         clamped,

@@ -9,9 +9,10 @@ Both end early when all lanes have diverged.
 
 from __future__ import annotations
 
-from fatigue_runner.compiled import FAST, njit
+from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.integrators.stepping import (
-    all_fine,
+    WIDTH,
+    advance,
     combine,
     keep,
     largest_error,
@@ -29,53 +30,49 @@ _rhs = kernel.rhs
 RING = 3
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def stages_of_step(
     n, h, now, states, k, s_rows, s_weights, s_counts, c, cell_duration, wind_cells, changing,
     tables, cells, constants, scratch, row, clamped, p, stage, slope,
 ):  # fmt: skip
     """Slopes of one Runge-Kutta step's stages but the first, which stands in k[now]; returns the last stage's time in steps."""
-    at = 0.0
+    at, slopes = 0.0, k.reshape(k.size)
     for i in range(1, len(c)):
         s_rows[i, 0] = now  # stage 0 is the first term everywhere, its row changes from step to step
         combine(states, now, k, s_rows, s_weights, i, s_counts[i], h, stage)
         if changing and c[i] != at:
             at = c[i]
             wind_at((n + at) * h, cell_duration, wind_cells, p)
-        _rhs(stage, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-        keep(slope, k, RING - 1 + i)
+        _rhs(stage, p, slopes, (RING - 1 + i) * WIDTH, tables, cells, constants, scratch, row, clamped)
     return at
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def runge_kutta(h, steps, method, wind, model, plan, work, rows, errors, diverged_at, clamped):
     """Advance one group with a Runge-Kutta method; see the module."""
     (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), (e_rows, e_weights, e_count) = method
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     out_step, exact, position, velocity = plan
-    states, k, p, stage, slope, largest, restart = work
-    now, output, all_diverged = 0, 1, False
+    states, k, p, stage, _slope, largest, restart = work
+    now, output, all_diverged, slopes = 0, 1, False, k.reshape(k.size)
 
     keep(restart, rows, 0)
     wind_at(0.0, cell_duration, wind_cells, p)
-    _rhs(restart, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-    keep(slope, k, 0)
+    _rhs(restart, p, slopes, 0, tables, cells, constants, scratch, row, clamped)
     for n in range(steps):
         at = stages_of_step(
             n, h, now, states, k, s_rows, s_weights, s_counts, c, cell_duration, wind_cells, changing,
-            tables, cells, constants, scratch, row, clamped, p, stage, slope,
+            tables, cells, constants, scratch, row, clamped, p, stage, _slope,
         )  # fmt: skip
         new = (now + 1) % 3
         b_rows[0, 0] = now
-        combine(states, now, k, b_rows, b_weights, 0, b_count, h, stage)
-        if not all_fine(stage):
+        if not advance(states, now, new, k, b_rows, b_weights, 0, b_count, h, stage):
             all_diverged = mark_diverged(stage, (n + 1) * h, diverged_at, restart)
-        keep(stage, states, new)
+            keep(stage, states, new)
         if changing and at != 1.0:
             wind_at((n + 1) * h, cell_duration, wind_cells, p)
-        _rhs(stage, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-        keep(slope, k, new)
+        _rhs(stage, p, slopes, new * WIDTH, tables, cells, constants, scratch, row, clamped)
         if e_count > 0:
             # the error's terms begin with this step's first slope and the next one's
             e_rows[0, 0], e_rows[0, 1] = now, new
@@ -93,7 +90,7 @@ def runge_kutta(h, steps, method, wind, model, plan, work, rows, errors, diverge
             break
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def multistep(h, steps, method, wind, model, plan, work, rows, errors, diverged_at, clamped):
     """Advance one group with an Adams method, started with a Runge-Kutta method; see the module."""
     (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), (order, weights, correcting, oldest) = (
@@ -102,13 +99,13 @@ def multistep(h, steps, method, wind, model, plan, work, rows, errors, diverged_
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     out_step, exact, position, velocity = plan
-    states, k, p, stage, slope, _largest, restart = work
+    states, k, p, stage, _slope, _largest, restart = work
     now, output, all_diverged, starting = 0, 1, False, weights.shape[1] - 1
+    slopes = k.reshape(k.size)
 
     keep(restart, rows, 0)
     wind_at(0.0, cell_duration, wind_cells, p)
-    _rhs(restart, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-    keep(slope, k, 0)
+    _rhs(restart, p, slopes, 0, tables, cells, constants, scratch, row, clamped)
     for n in range(steps):
         at = 0.0
         back1, back2 = (now + 2) % 3, (now + 1) % 3
@@ -116,30 +113,28 @@ def multistep(h, steps, method, wind, model, plan, work, rows, errors, diverged_
         if n < starting:
             at = stages_of_step(
                 n, h, now, states, k, s_rows, s_weights, s_counts, c, cell_duration, wind_cells, changing,
-                tables, cells, constants, scratch, row, clamped, p, stage, slope,
+                tables, cells, constants, scratch, row, clamped, p, stage, _slope,
             )  # fmt: skip
             b_rows[0, 0] = now
-            combine(states, now, k, b_rows, b_weights, 0, b_count, h, stage)
+            fine = advance(states, now, new, k, b_rows, b_weights, 0, b_count, h, stage)
         else:
             order[0, 0], order[0, 1], order[0, 2], order[0, 3] = now, back1, back2, oldest
-            combine(states, now, k, order, weights, 0, 4, h, stage)
+            fine = advance(states, now, new, k, order, weights, 0, 4, h, stage)
             if correcting:
                 if changing:
                     at = 1.0
                     wind_at((n + 1) * h, cell_duration, wind_cells, p)
-                _rhs(stage, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-                keep(slope, k, oldest + 1)
+                _rhs(stage, p, slopes, (oldest + 1) * WIDTH, tables, cells, constants, scratch, row, clamped)
                 order[1, 0], order[1, 1], order[1, 2], order[1, 3] = oldest + 1, now, back1, back2
-                combine(states, now, k, order, weights, 1, 4, h, stage)
-        if not all_fine(stage):
+                fine = advance(states, now, new, k, order, weights, 1, 4, h, stage)
+        if not fine:
             all_diverged = mark_diverged(stage, (n + 1) * h, diverged_at, restart)
-        keep(stage, states, new)
+            keep(stage, states, new)
         if changing and at != 1.0:
             wind_at((n + 1) * h, cell_duration, wind_cells, p)
-        _rhs(stage, p, slope, 0, tables, cells, constants, scratch, row, clamped)
         # the slope two steps back becomes the oldest; its place in the ring is the newest one's
         move(k, new, oldest)
-        keep(slope, k, new)
+        _rhs(stage, p, slopes, new * WIDTH, tables, cells, constants, scratch, row, clamped)
         now = new
         while output < len(out_step) and out_step[output] <= n + 1:
             write_output(output, exact, position, velocity, h, states, k, now, rows)

@@ -1,19 +1,19 @@
 """Compiled pieces of a time step of one group of LANES cases in lockstep; `loops` puts them together.
 
-`FAST` lets LLVM assume that there is no NaN, so the divergence check compares bits, not numbers. Loops over the state have the
-constant length WIDTH and write to one array, so that they vectorise. Whole arrays and row numbers are passed, never rows: numba
-counts references of a row atomically, which cost as much as half an evaluation (measured); and functions have one exit, so that
-it can drop the counting of their arguments.
+`LEAN` lets LLVM assume that there is no NaN, so the divergence check compares bits, not numbers. Loops over the state have the
+constant length WIDTH and write to one array, so that they vectorise. Whole arrays and row numbers are passed, never rows.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from fatigue_runner.compiled import FAST, njit
+from fatigue_runner.compiled import INLINE, LEAN, njit
+from fatigue_runner.integrators.vectors import WIDTH, stage_sum
 from fatigue_runner.turbine.generated.kernel import LANES
 
-WIDTH = 16 * LANES
 HALF = 8 * LANES
 WIND = 3 * LANES
 
@@ -24,7 +24,7 @@ STATE_BITS, AZIMUTH_BITS = (int(np.float64(bound).view(np.int64)) for bound in (
 MAGNITUDE = 2**63 - 1  # all bits of a double but its sign
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def all_fine(x):
     """Whether all lanes are within the bounds, compared as integers.
 
@@ -42,7 +42,7 @@ def all_fine(x):
     return outside == 0
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def mark_diverged(x, time, diverged_at, restart):
     """Note the time for lanes that left the bounds and put them on their `restart` state, so that they stay finite.
 
@@ -64,7 +64,7 @@ def mark_diverged(x, time, diverged_at, restart):
     return count == LANES
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def wind_at(time, cell_duration, cells, p):
     """Piecewise cubic wind signals: cells (n, 4, WIND) -> p (WIND,)."""
     # 0.3 / 0.1 is 2.9999999999999996: a step time belongs to the cell that begins there
@@ -74,53 +74,37 @@ def wind_at(time, cell_duration, cells, p):
         p[m] = ((cells[i, 3, m] * u + cells[i, 2, m]) * u + cells[i, 1, m]) * u + cells[i, 0, m]
 
 
-@njit(**FAST)
+_combined: Any = stage_sum(None)  # intrinsics, whose first argument numba supplies
+_advanced: Any = stage_sum((STATE_BITS, AZIMUTH_BITS))
+
+
+@njit(**INLINE)
 def combine(states, now, k, rows, weights, line, count, h, out):
-    """out = states[now] + h sum_j weights[line, j] k[rows[line, j]], j < count: as few passes over the state as possible.
-
-    `out` (WIDTH,) must be an array of its own: LLVM's check for overlap would take the scalar loop. The tables are padded with
-    zero weights of row 0 to a multiple of four.
-    """
-    a, p = h * weights[line, 0], rows[line, 0]
-    b, q = h * weights[line, 1], rows[line, 1]
-    c, r = h * weights[line, 2], rows[line, 2]
-    d, s = h * weights[line, 3], rows[line, 3]
-    if count == 1:
-        for m in range(WIDTH):
-            out[m] = states[now, m] + a * k[p, m]
-    elif count == 2:
-        for m in range(WIDTH):
-            out[m] = states[now, m] + (a * k[p, m] + b * k[q, m])
-    elif count == 3:
-        for m in range(WIDTH):
-            out[m] = states[now, m] + (a * k[p, m] + b * k[q, m] + c * k[r, m])
-    else:
-        for m in range(WIDTH):
-            out[m] = states[now, m] + ((a * k[p, m] + b * k[q, m]) + (c * k[r, m] + d * k[s, m]))
-    for j in range(4, count, 4):
-        a, p = h * weights[line, j], rows[line, j]
-        b, q = h * weights[line, j + 1], rows[line, j + 1]
-        c, r = h * weights[line, j + 2], rows[line, j + 2]
-        d, s = h * weights[line, j + 3], rows[line, j + 3]
-        for m in range(WIDTH):
-            out[m] += (a * k[p, m] + b * k[q, m]) + (c * k[r, m] + d * k[s, m])
+    """out = states[now] + h sum_j weights[line, j] k[rows[line, j]], j < count."""
+    _combined(states, now, k, rows, weights, line, count, h, out, now)
 
 
-@njit(**FAST)
+@njit(**INLINE)
+def advance(states, now, new, k, rows, weights, line, count, h, out):
+    """As `combine`, stored in states[new] too; returns `all_fine(out)`."""
+    return _advanced(states, now, k, rows, weights, line, count, h, out, new)
+
+
+@njit(**LEAN)
 def keep(values, table, line):
     """table[line] = values"""
     for m in range(WIDTH):
         table[line, m] = values[m]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def move(table, line, to):
     """table[to] = table[line]"""
     for m in range(WIDTH):
         table[to, m] = table[line, m]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def largest_error(k, rows, weights, count, h, largest):
     """largest = max(largest, |h sum_j weights[0, j] k[rows[0, j]]|), element by element; at most eight terms."""
     a, p = h * weights[0, 0], rows[0, 0]
@@ -142,7 +126,7 @@ def largest_error(k, rows, weights, count, h, largest):
             largest[m] = max(largest[m], abs(e + f))
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def scaled_error(largest, x, errors, interval):
     """errors[interval] (LANES,) = largest component of `largest` / (1 + |x|), per lane; `largest` starts anew."""
     for m in range(WIDTH):
@@ -157,7 +141,7 @@ def scaled_error(largest, x, errors, interval):
         largest[m] = 0.0
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def write_output(output, exact, position, velocity, h, states, k, newest, rows):
     """Write output row `output`: the newest step end, or the Hermite polynomial through the last three.
 

@@ -60,7 +60,15 @@ def lane_kernel(code: Code, arrays: Sequence[str], lanes: int) -> Callable[..., 
                 for i in range(count + 5)
             ]
             names = [*arrays, "start", "tables", "cells", "constants", "clamped"]
-            _Emitter(builder, code, dict(zip(names, data, strict=True)), arrays[-1], lanes).run()
+            # a function of its own that takes nothing but pointers: numba's pass seven words an array
+            kind = ir.FunctionType(ir.VoidType(), [value.type for value in data])
+            function = ir.Function(builder.module, kind, builder.module.get_unique_name("lane_kernel"))
+            function.linkage = "internal"
+            function.attributes.add("noinline")
+            inside = ir.IRBuilder(function.append_basic_block())
+            _Emitter(inside, code, dict(zip(names, function.args, strict=True)), arrays[-1], lanes).run()
+            inside.ret_void()
+            builder.call(function, data)
             return context.get_dummy_value()
 
         return signature, codegen

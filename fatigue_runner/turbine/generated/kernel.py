@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from fatigue_runner.compiled import FAST, njit
+from fatigue_runner.compiled import INLINE, njit
 from fatigue_runner.turbine.lane_code import Code, lane_kernel
 
 LANES = 16
@@ -920,7 +920,7 @@ out[15] = x_gen
 _rhs: Any = lane_kernel(RHS_CODE, ('x', 'wind', 'out'), LANES)
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def rhs(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
     """State derivative of LANES cases: x, out[start:] in blocks (16, LANES), wind (3, LANES)."""
     _rhs(x, wind, out, start, tables, cells, constants, clamped)
@@ -1469,7 +1469,7 @@ out[18] = sdd
 _loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'derivative', 'out'), LANES)
 
 
-@njit(**FAST)
+@njit(**INLINE)
 def loads(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped):
     """Load channels of LANES states: x, derivative (16, LANES), wind (3, LANES), out (k, LANES)."""
     _loads(x, wind, derivative, out, start, tables, cells, constants, clamped)
