@@ -147,17 +147,23 @@ def evaluate(block: Sequence[Any], reference: Reference, cases: Cases, point: Po
 
 def reference_quality(cases: Cases, reference: Reference) -> list[dict[str, Any]]:
     """How far the reference is from itself at half its step, and from another method of high order at both: NRMSE of the worst
-    state of the worst case, largest DEL error."""
+    state of the worst case, that state and how far it moves at least in a case, largest DEL error."""
+    from fatigue_runner.channels import STATE_NAMES
+
+    moves = np.min([np.ptp(t.state, axis=0) for t in reference.trajectories], axis=0)
     method, step = cases.reference
     other = "rk7" if method == "dop853" else "dop853"
     rows = []
     for name, size in ((method, step / 2), (other, step), (other, step / 2)):
         block = simulate(cases, Entry(name, size))
         point = evaluate(block, reference, cases, point_of(Entry(name, size), cases, block))
+        state = max(point.nrmse, key=lambda name: point.nrmse[name], default="")
         rows.append(
             {
                 "method": name,
                 "step": size,
+                "state": state,
+                "moves": float(moves[STATE_NAMES.index(state)]) if state else None,
                 "nrmse_worst": point.nrmse_worst,
                 "del_error_max": point.del_error_max,
                 "diverged": point.diverged,

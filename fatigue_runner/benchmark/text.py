@@ -11,6 +11,7 @@ from fatigue_runner.benchmark import answers
 from fatigue_runner.benchmark.answers import Answer, Reached
 from fatigue_runner.benchmark.points import Point
 from fatigue_runner.benchmark.targets import targets
+from fatigue_runner.channels import BY_NAME
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> list[str]:
@@ -90,10 +91,12 @@ def trust(result: dict[str, Any]) -> str:
     named = f"{reference['method']} at {reference['step'] * 1e3:g} ms"
     if not rows:
         return f"Reference: {named}; nothing else could check it."
+    worst = max(rows, key=lambda r: r["nrmse_worst"])
     others = ", ".join(f"{r['method']} at {r['step'] * 1e3:g} ms" for r in rows)
+    moves = f"`{worst['state']}`, which in one of them moves by {worst['moves']:.1e} {BY_NAME[worst['state']].unit} only"
     return (
-        f"Reference: {named}; {others} agree with it to an NRMSE of {max(r['nrmse_worst'] for r in rows):.0e} (worst state of the "
-        f"worst case) and a DEL error of {max(r['del_error_max'] for r in rows):.0e}: errors near that say nothing."
+        f"Reference: {named}; {others} agree with it to an NRMSE of {worst['nrmse_worst']:.0e} (worst state of the worst case: "
+        f"{moves}) and a DEL error of {max(r['del_error_max'] for r in rows):.0e}: errors near that say nothing."
     )
 
 
