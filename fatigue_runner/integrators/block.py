@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators.correcting import Correcting, prepare
+from fatigue_runner.integrators.correcting import Correcting, prepare, prepare_exponential
 from fatigue_runner.integrators.exponential import ExponentialRungeKutta, matrices
+from fatigue_runner.integrators.exponential_adams import ExponentialAdams
 from fatigue_runner.integrators.methods import Method
 from fatigue_runner.integrators.methods import method as find_method
 from fatigue_runner.integrators.multistep import LinearMultistep
@@ -59,9 +60,13 @@ def simulate_block(
     steps = int(np.ceil(duration / step - 1e-9))
     plan = plan_output(duration, step, steps, output_step, found.order)
     correcting = None
-    if corrector is not None:
+    if isinstance(found, ExponentialAdams):
+        correcting = prepare_exponential(corrector, turbine, found, step, mode, pitch)
+    elif corrector is not None:
         if not isinstance(found, ButcherTableau):
-            raise InputError(f"a corrector needs a Runge-Kutta method, {method} is none")
+            raise InputError(
+                f"a corrector needs a Runge-Kutta or an exponential Adams method, {method} is none"
+            )
         correcting = prepare(corrector, turbine, found, step, mode)
     return _run(turbine, found, correcting, step, steps, winds, initial, plan, pitch)
 
@@ -145,6 +150,10 @@ def _prepare(turbine: Turbine, method: Method, step: float, pitch: float) -> tup
     from fatigue_runner.integrators import loops
     from fatigue_runner.integrators.kernel_data import multistep_data, runge_kutta_data, slope_rows
 
+    if isinstance(method, ExponentialAdams):
+        from fatigue_runner.integrators.loops_exponential_adams import exponential_adams
+
+        return exponential_adams, None, 3
     if isinstance(method, ExponentialRungeKutta):
         # compiled only where it is used, as the corrected loop
         from fatigue_runner.integrators.loops_exponential import exponential
@@ -171,9 +180,6 @@ def _run_group(
 
     from fatigue_runner.turbine.lanes import LANES, work_space
 
-    if correcting is not None:
-        # compiled only where it is used: a campaign without correctors starts faster
-        from fatigue_runner.integrators.corrected import corrected_steps, working_arrays
     advance, method_data, slopes = prepared
     cell_duration, cells = wind
     changing = bool(np.any(cells[:, 1:])) or len(cells) > 1
@@ -204,11 +210,10 @@ def _run_group(
             step, steps, method_data, wind_data, model, plan_data, work, group.rows, group.errors, group.diverged_at, clamped
         )  # fmt: skip
     else:
-        loop = corrected_steps
+        loop, own_work = correcting.loop(start, len(k), aligned)
         arguments = (
             step, steps, correcting.method, correcting.network, correcting.safety, wind_data, model, plan_data,
-            working_arrays(start, len(k), aligned), group.rows, (group.accepted, group.discrepancy, group.errors),
-            group.diverged_at, clamped,
+            own_work, group.rows, (group.accepted, group.discrepancy, group.errors), group.diverged_at, clamped,
         )  # fmt: skip
     if not loop.signatures:
         # a process compiles a loop once, or loads it from the cache: that is no time of the integration

@@ -1,4 +1,4 @@
-"""A corrector made ready for the compiled loop: network, fallback and acceptance test as the arrays that it reads."""
+"""A corrector made ready for its compiled loop: network, fallback and acceptance test as the arrays that it reads."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.integrators import exponential_adams as adams
 from fatigue_runner.integrators.tableaux import ButcherTableau
 
 if TYPE_CHECKING:
@@ -21,32 +22,74 @@ SHARING = {"heun": "rk3"}
 
 @dataclass(frozen=True)
 class Correcting:
-    """What `corrected.corrected_steps` takes beside the plain method's arguments."""
+    """What `corrected.corrected_steps`, or the exponential Adams loop, takes beside the plain method's arguments."""
 
     method: tuple[Any, ...]
     network: tuple[Any, ...]
     safety: tuple[Any, ...]
     limit: float
-    fallback_evaluations: int  # per step, beyond those it shares
+    extra_per_step: int  # evaluations of the fallback, beyond those it shares
+    past: int = 0  # earlier nonlinear parts that an exponential Adams method sees; 0: a Runge-Kutta method
+    extra_at_start: int = 0  # evaluations in the first steps, beyond the plain method's
 
     @property
     def hybrid(self) -> bool:
         return bool(self.safety[0])
 
-    def extra_evaluations(self, steps: int) -> int:
-        """Evaluations of the fallback in a run of `steps` steps: all of a hybrid, the first ones of a network that looks back."""
-        from fatigue_runner.integrators.corrected import STARTING
+    def loop(self, start: Any, slopes: int, aligned: Any) -> tuple[Any, Any]:
+        """The compiled loop, imported only where it is used, and its working arrays for the initial states (WIDTH,)."""
+        if self.past:
+            from fatigue_runner.integrators import loops_exponential_adams as loops
 
-        history, own = self.network[2], len(self.method[2])
+            inputs = adams.base_rows(self.past) * (1 + len(self.network[3]))
+            return loops.exponential_adams, loops.working_arrays(start, self.past, inputs, aligned)
+        from fatigue_runner.integrators.corrected import corrected_steps, working_arrays
+
+        return corrected_steps, working_arrays(start, slopes, aligned)
+
+    def extra_evaluations(self, steps: int) -> int:
+        """Evaluations beyond the plain method's in a run of `steps` steps."""
+        history = 0 if self.past else self.network[2]
         start = min(steps, history)
-        return start * (STARTING * own - 1) + (
-            self.fallback_evaluations * (steps - start) if self.hybrid else 0
-        )
+        at_start = self.extra_at_start if self.past else start * self.extra_at_start
+        return at_start + (self.extra_per_step * (steps - start) if self.hybrid else 0)
+
+
+def prepare_exponential(
+    corrector: Any, turbine: Turbine, method: adams.ExponentialAdams, step: float, mode: str, pitch: float
+) -> Correcting:
+    """An exponential Adams method at this step and pitch [rad], plain (corrector None) or with a learned part. Raises as `prepare`."""
+    if corrector is None:
+        ahead, plain = adams.matrices(turbine, method, step, pitch, method.past)
+        network = adams.network(ahead, plain, plain)
+        data = adams.loop_data(turbine, pitch, method.past)
+        return Correcting(data, network, adams.unguarded(), np.nan, 0, method.past)
+    if mode not in MODES:
+        raise InputError(f"unknown mode {mode!r}{did_you_mean(mode, MODES)}")
+    corrector.bind(turbine, method.name, step)
+    past = corrector.past
+    ahead, plain = adams.matrices(turbine, method, step, pitch, past)
+    learned_ahead, learned, factors = corrector.matrices()
+    whole = learned.copy()
+    whole[:, : plain.shape[1]] += plain
+    guard = corrector.guard
+    safety = (mode == "hybrid", np.array(guard.atol), np.array(guard.rtol), float(guard.limit), _norm(guard))
+    more = method.evaluations(1000, past) - method.evaluations(1000)
+    return Correcting(
+        adams.loop_data(turbine, pitch, past), adams.network(ahead + learned_ahead, whole, plain, factors), safety,
+        float(guard.limit), 0, past, more,
+    )  # fmt: skip
+
+
+def _norm(guard: Any) -> int:
+    from fatigue_runner.integrators.corrected import NORM_MAX, NORM_RMS
+
+    return NORM_MAX if guard.norm == "max" else NORM_RMS
 
 
 def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: float, mode: str) -> Correcting:
     """Bind a `corrector.Corrector` to a run. Raises InputError for an unknown mode, CorrectorError where it does not fit."""
-    from fatigue_runner.integrators.corrected import NORM_MAX, NORM_RMS
+    from fatigue_runner.integrators.corrected import STARTING
     from fatigue_runner.integrators.kernel_data import runge_kutta_data, stage_rows
     from fatigue_runner.integrators.methods import method as find_method
 
@@ -72,14 +115,16 @@ def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: floa
         again = runge_kutta_data(method)
         fallback = (*again[:2], 0, guard.substeps)
         extra = guard.substeps * stages - 1
-    norm = NORM_MAX if guard.norm == "max" else NORM_RMS
     safety = (
         mode == "hybrid",
         fallback,
         np.array(guard.atol),
         np.array(guard.rtol),
         float(guard.limit),
-        norm,
+        _norm(guard),
     )
     network = corrector.kernel_network(turbine.parameters["g_ratio"])
-    return Correcting((*data[:2], rows), network, safety, float(guard.limit), extra)
+    at_start = STARTING * stages - 1
+    return Correcting(
+        (*data[:2], rows), network, safety, float(guard.limit), extra, extra_at_start=at_start
+    )

@@ -14,13 +14,13 @@ _rhs = kernel.rhs
 
 
 @njit(**FAST)
-def integrate(x, method, h, steps, wind, model, clamped, k, p, stage, slope, states):
-    """`steps` plain steps of size h from x (WIDTH,), which is overwritten; k[0] and k[3:] are the last step's slopes."""
+def integrate(x, method, h, first, steps, wind, model, clamped, k, p, stage, slope, states):
+    """Plain steps `first` to `first + steps` of size h from x (WIDTH,), which is overwritten; k[0] and k[3:] are the last step's slopes."""
     (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count) = method
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     b_rows[0, 0] = 0
-    for n in range(steps):
+    for n in range(first, first + steps):
         keep(x, states, 0)
         wind_at(n * h, cell_duration, wind_cells, p)
         _rhs(x, p, slope, 0, tables, cells, constants, scratch, row, clamped)
@@ -50,7 +50,7 @@ def step_samples(
         piece[0] = pieces[group]
         wind = (1e9, piece, True)
         now[:] = x[group]
-        integrate(now, method, h, 1, wind, model, clamped, k, p, stage, slope, states)
+        integrate(now, method, h, 0, 1, wind, model, clamped, k, p, stage, slope, states)
         plain[group] = now
         wind_at(0.0, 1e9, piece, start)
         wind_at(0.5 * h, 1e9, piece, middle)
@@ -59,5 +59,5 @@ def step_samples(
         features(x[group], k, stage_rows, h, ratio, start, middle, end, rows[group])
         raw_features(x[group], start, raw[group])
         now[:] = x[group]
-        integrate(now, accurate, h / substeps, substeps, wind, model, clamped, k, p, stage, slope, states)
+        integrate(now, accurate, h / substeps, 0, substeps, wind, model, clamped, k, p, stage, slope, states)
         exact[group] = now

@@ -1,7 +1,7 @@
 """The registry of methods: name -> method.
 
-Adding a Runge-Kutta method is one entry in tableaux.py, an Adams method one in multistep.py, and one word here; an exponential
-one stands in exponential.py.
+Adding a Runge-Kutta method is one entry in tableaux.py, an Adams method one in multistep.py, and one word here; the
+exponential ones stand in exponential.py and exponential_adams.py.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.integrators import multistep as m
 from fatigue_runner.integrators import tableaux as t
 from fatigue_runner.integrators.exponential import ETDRK4
+from fatigue_runner.integrators.exponential_adams import ETDABM3, ETDABM4
 
 
 class Method(Protocol):
@@ -43,7 +44,7 @@ _BY_NAME: dict[str, Method] = {
     x.name: x
     for x in (
         t.EULER, t.HEUN, t.RK3, t.HEUN_RICHARDSON, t.BS32, t.RK4, t.DP5, t.TSIT5, t.RK7, m.AB4, m.ABM4,
-        ETDRK4,
+        ETDRK4, ETDABM3, ETDABM4,
     )
 }  # fmt: skip
 
