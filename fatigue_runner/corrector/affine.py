@@ -27,10 +27,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from fatigue_runner.corrector import features, fit, samples
+from fatigue_runner.corrector import exponential_adams, features, fit, samples
 from fatigue_runner.corrector.artefact import Corrector, Guard
 from fatigue_runner.corrector.guard import from_training_set
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.integrators.exponential_adams import ExponentialAdams
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
@@ -137,7 +138,7 @@ class AffineRecipe(_Part):
     @classmethod
     def _has_stages(cls, value: str) -> str:
         try:
-            samples.tableau(value)
+            samples.base_method(value)
         except InputError as error:
             raise ValueError(str(error)) from None
         return value
@@ -185,6 +186,12 @@ def train_affine(
 ) -> Corrector:
     """The guarded corrector that a recipe makes; say: told of each stage; text: the recipe's file, kept in the artefact."""
     begin = time.perf_counter()
+    if isinstance(samples.base_method(recipe.method), ExponentialAdams):
+        made_here = exponential_adams.train(
+            recipe, turbine, lambda blowing: starts(turbine, blowing, recipe.initial, initial_state), say, text
+        )
+        say("validation")
+        return replace(made_here, validation=validate(made_here, recipe, turbine, initial_state))
     winds = recipe.training.build()
     say(f"reference trajectories under {len(winds)} winds")
     common: dict[str, Any] = {"perturbation": recipe.perturbation, "history": recipe.history}
@@ -229,19 +236,13 @@ def validate(
     step = samples.output_step(recipe.step, 1)
     duration = recipe.validation.duration - 2 * recipe.step
     runs = samples.references(turbine, winds, start, duration, step)
-    unseen = samples.collect(
-        turbine,
-        recipe.method,
-        recipe.step,
-        winds,
-        duration,
-        200,
-        0.0,
-        recipe.seed + 1,
-        history=recipe.history,
-        runs=runs,
-    )
-    left = fit.relative_residual(corrector.predict(unseen), unseen.defect)
+    if corrector.past:
+        left = exponential_adams.residual(corrector, turbine, winds, runs, recipe.seed + 1)
+    else:
+        unseen = samples.collect(
+            turbine, recipe.method, recipe.step, winds, duration, 200, 0.0, recipe.seed + 1, history=recipe.history, runs=runs
+        )  # fmt: skip
+        left = fit.relative_residual(corrector.predict(unseen), unseen.defect)
     out = {f"residual_{name}": float(value) for name, value in zip(STATE_NAMES, left, strict=True)}
     for mode in ("plain", "enhanced", "hybrid"):
         errors, accepted = rollout_errors(

@@ -63,7 +63,8 @@ class Corrector:
     """N(x, p) of x+ = eta_h(x) + h^(p+1) N, for one turbine, method and step [s].
 
     linear (16, k) or None acts on `features.names(kind, stages, factors, history)`; layers: (outputs, inputs + 1) matrices, the
-    bias first, on the same features without factors; their sum is h^(p+1) N divided by h^(p+1).
+    bias first, on the same features without factors; their sum is h^(p+1) N divided by h^(p+1). An exponential Adams method has a
+    `predictor` (16, k) beside, in the same units, on the rows that are known before the evaluation of the step.
     """
 
     name: str
@@ -84,15 +85,62 @@ class Corrector:
     recipe: str = ""
     licence: str = "Apache-2.0"
     history: int = 0
+    predictor: Array | None = None
 
     def __post_init__(self) -> None:
-        self._check_shapes()
+        self._check_kind()
+        weights = [w for w in (self.linear, *self.layers, self.predictor) if w is not None]
+        if not all(np.isfinite(w).all() for w in weights):
+            raise CorrectorError(f"corrector {self.name}: a weight is not a finite number; train it anew")
 
     @property
     def order(self) -> int:
         from fatigue_runner.integrators import method
 
         return method(self.method).order
+
+    @property
+    def past(self) -> int:
+        """Earlier nonlinear parts that an exponential Adams method's corrector sees; 0 for a Runge-Kutta method's."""
+        from fatigue_runner.integrators import method
+
+        return max(getattr(method(self.method), "past", 0), self.history) if self.predictor is not None else 0
+
+    def _check_kind(self) -> None:
+        from fatigue_runner.corrector.samples import base_method
+        from fatigue_runner.integrators.exponential_adams import ExponentialAdams
+
+        exponential = isinstance(base_method(self.method), ExponentialAdams)
+        if exponential != (self.kind == feature_names.MULTI_BLADE) or exponential == (self.predictor is None):
+            raise CorrectorError(
+                f"corrector {self.name}: features {self.kind!r} do not exist for {self.method}, or its predictor is missing or too many"
+            )
+        if exponential:
+            self._check_matrices()
+        else:
+            self._check_shapes()
+
+    def _check_matrices(self) -> None:
+        from fatigue_runner.integrators.exponential_adams import MOST_PAST, PARTS, base_rows
+
+        feature_names.multi_blade_factors(self.factors)
+        if not 0 <= self.history <= MOST_PAST or self.layers or self.linear is None or self.predictor is None:
+            raise CorrectorError(
+                f"corrector {self.name}: one of an exponential method is two matrices that look back {MOST_PAST} steps at most"
+            )
+        rows = base_rows(self.past)
+        wanted = (16, rows - PARTS), (16, rows * (1 + len(self.factors)))
+        if (self.predictor.shape, self.linear.shape) != wanted:
+            raise CorrectorError(
+                f"corrector {self.name}: weights of shape {self.predictor.shape} and {self.linear.shape} do not fit {self.method}'s "
+                f"features, which need {wanted[0]} and {wanted[1]}"
+            )
+
+    def matrices(self) -> tuple[Array, Array, tuple[int, ...]]:
+        """Learned parts of an exponential Adams method's predictor and corrector, scaled to the defect, and the rows of its factors."""
+        assert self.predictor is not None and self.linear is not None
+        size = self.step ** (self.order + 1)
+        return self.predictor * size, self.linear * size, feature_names.multi_blade_factors(self.factors)
 
     def _check_shapes(self) -> None:
         from fatigue_runner.corrector.samples import tableau
@@ -133,9 +181,6 @@ class Corrector:
             width = layer.shape[0]
         if self.layers and width != 16:
             raise CorrectorError(f"corrector {self.name}: the last layer has {width} outputs instead of 16")
-        weights = [w for w in (self.linear, *self.layers) if w is not None]
-        if not all(np.isfinite(w).all() for w in weights):
-            raise CorrectorError(f"corrector {self.name}: a weight is not a finite number; train it anew")
 
     def bind(self, turbine: Turbine, method: str, step: float) -> None:
         """Raises CorrectorError unless the corrector was trained for this turbine, method and step."""
@@ -205,6 +250,8 @@ def save(corrector: Corrector, path: Path) -> None:
     tensors = {f"layer{i}": np.ascontiguousarray(w) for i, w in enumerate(corrector.layers)}
     if corrector.linear is not None:
         tensors["linear"] = np.ascontiguousarray(corrector.linear)
+    if corrector.predictor is not None:
+        tensors["predictor"] = np.ascontiguousarray(corrector.predictor)
     header = _header(corrector)
     data = to_bytes(tensors, metadata={"format": FORMAT, "header": json.dumps(header)})
     part = path.with_name(path.name + ".part")
@@ -213,7 +260,7 @@ def save(corrector: Corrector, path: Path) -> None:
 
 
 def _header(corrector: Corrector) -> dict[str, Any]:
-    skip = {"linear", "layers", "guard"}
+    skip = {"linear", "predictor", "layers", "guard"}
     out = {k: getattr(corrector, k) for k in corrector.__dataclass_fields__ if k not in skip}
     out["guard"] = asdict(corrector.guard)
     out["layers"] = len(corrector.layers)
@@ -248,7 +295,9 @@ def load(path: Path | str) -> Corrector:
         header["guard"] = Guard(**guard)
         header["wind_range"], header["factors"] = tuple(header["wind_range"]), tuple(header["factors"])
         layers = tuple(tensors[f"layer{i}"].astype(float) for i in range(count))
-        linear = tensors.get("linear")
-        return Corrector(linear=None if linear is None else linear.astype(float), layers=layers, **header)
+        linear, predictor = (
+            tensors[key].astype(float) if key in tensors else None for key in ("linear", "predictor")
+        )
+        return Corrector(linear=linear, predictor=predictor, layers=layers, **header)
     except (KeyError, TypeError, json.JSONDecodeError) as error:
         raise CorrectorError(f"{path}: the header is incomplete ({error}); train it anew") from None

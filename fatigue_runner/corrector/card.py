@@ -20,14 +20,12 @@ _LABELS = {
 def summary(corrector: Corrector) -> list[tuple[str, str]]:
     """(label, value) pairs of what a person asks first."""
     guard = corrector.guard
-    fallback = (
-        f"{guard.substeps} substeps of {corrector.method}"
-        if guard.substeps
-        else "the method of the next order"
-    )
+    fallback = f"{guard.substeps} substeps of {corrector.method}" if guard.substeps else "the method of the next order"
+    if corrector.past:
+        fallback = f"{corrector.method} as it is"
     looks = f", looks back {corrector.history} step(s)" if corrector.history else ""
     features = f"{corrector.kind}{' x (1, ' + ', '.join(corrector.factors) + ')' if corrector.factors else ''}{looks}"
-    sizes = [w.shape for w in (corrector.linear, *corrector.layers) if w is not None]
+    sizes = [w.shape for w in (corrector.predictor, corrector.linear, *corrector.layers) if w is not None]
     return [
         ("family", corrector.family),
         ("turbine", f"{corrector.turbine} ({corrector.turbine_hash[:12]})"),

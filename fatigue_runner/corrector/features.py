@@ -9,8 +9,8 @@ _DEFLECTIONS = STATE_NAMES[:6]
 _RATES = (*STATE_NAMES[8:15], "shaft_twist_rate")
 _WIND = ("wind_speed", "vertical_shear", "horizontal_shear")
 
-STAGE_AWARE, RAW = "stage-aware", "raw"
-KINDS = (STAGE_AWARE, RAW)
+STAGE_AWARE, RAW, MULTI_BLADE = "stage-aware", "raw", "multi-blade"
+KINDS = (STAGE_AWARE, RAW, MULTI_BLADE)
 
 
 def stage_aware(stages: int, history: int = 0) -> tuple[str, ...]:
@@ -25,6 +25,37 @@ def stage_aware(stages: int, history: int = 0) -> tuple[str, ...]:
 def raw() -> tuple[str, ...]:
     """1, the state as it is, azimuths included, and the wind speed: what the network of arXiv 2504.05493 sees."""
     return ("one", *STATE_NAMES, "wind_speed")
+
+
+def multi_blade(past: int) -> tuple[str, ...]:
+    """What a step of an exponential Adams method sees, in the order of its compiled rows (integrators/exponential_adams.py).
+
+    Blades by the mean, cosine and sine part over the azimuth; the wind's shears times its speed; `past` earlier nonlinear parts of the
+    accelerations, the newest first, and the one at the predicted end of the step.
+    """
+
+    def blades(values: tuple[str, ...]) -> tuple[str, ...]:
+        turned = {"1": "mean", "2": "cosine", "3": "sine"}
+        return tuple(f"{turned[v[5]]}{v[6:]}" if v.startswith("blade") else v for v in values)
+
+    wind = tuple(f"{w}@{at}" for at in ("start", "middle", "end") for w in _WIND)
+    parts = tuple(
+        f"nonlinear_{r}_derivative@{at}"
+        for at in (*(f"step-{i}" if i else "start" for i in range(past)), "end")
+        for r in blades(_RATES)
+    )
+    return ("one", *blades(_DEFLECTIONS), "shaft_twist", *blades(_RATES), *wind, *parts)
+
+
+def multi_blade_factors(factors: tuple[str, ...]) -> tuple[int, ...]:
+    """Rows of the multi-blade features that hold the factors. Raises InputError for one that this kind does not have."""
+    rows = {"wind_speed@start": 16, "rotor_speed": 14}
+    for factor in factors:
+        if factor not in rows:
+            raise InputError(
+                f"feature factor {factor!r} does not exist for exponential methods{did_you_mean(factor, rows)}"
+            )
+    return tuple(rows[f] for f in factors)
 
 
 # what the features can be multiplied with, so that the affine map may vary over a revolution and with the wind

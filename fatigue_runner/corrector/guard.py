@@ -72,12 +72,25 @@ def from_training_set(
         substeps = fallback_substeps(turbine, corrector.method, corrector.step, corrector.history)
     other = fallback_results(turbine, corrector.method, corrector.step, substeps, samples)
     difference = samples.plain + corrector.predict(samples) - other
+    return limit_of(difference, samples.state, other, norm, kappa, quantile, rtol, substeps)
+
+
+def limit_of(
+    difference: Array,
+    state: Array,
+    fallback: Array,
+    norm: str,
+    kappa: float,
+    quantile: float,
+    rtol: float,
+    substeps: int = 0,
+) -> Guard:
+    """The guard whose limit is kappa * the quantile of |difference| (n, 16) in its units; see `from_training_set`."""
     usual = np.sqrt((difference**2).mean(axis=0))
-    atol = np.maximum(
-        usual, 1e-15 * (1 + np.abs(samples.state).max(axis=0))
-    )  # never 0: a constant wind leaves states at rest
+    # never 0: a constant wind leaves states at rest
+    atol = np.maximum(usual, 1e-15 * (1 + np.abs(state).max(axis=0)))
     guard = Guard(0.0, norm, kappa, quantile, tuple(atol.tolist()), (rtol,) * 16, substeps)
-    size = distances(difference, samples.state, other, guard)
+    size = distances(difference, state, fallback, guard)
     return Guard(
         kappa * float(np.quantile(size, quantile)), norm, kappa, quantile, guard.atol, guard.rtol, substeps
     )

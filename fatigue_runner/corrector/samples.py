@@ -99,6 +99,14 @@ def single_steps(
     )
 
 
+def base_method(method: str) -> Any:
+    """The Runge-Kutta or exponential Adams method of this name. Raises InputError for one that no corrector is made for."""
+    from fatigue_runner.integrators.exponential_adams import ExponentialAdams
+
+    found = find_method(method)
+    return found if isinstance(found, ExponentialAdams) else tableau(method)
+
+
 def tableau(method: str) -> Any:
     """The Runge-Kutta method of this name. Raises InputError for a method that is none: it has no stages to see."""
     from fatigue_runner.integrators.tableaux import ButcherTableau
@@ -106,7 +114,7 @@ def tableau(method: str) -> Any:
     found = find_method(method)
     if not isinstance(found, ButcherTableau):
         raise InputError(
-            f"correctors exist for Runge-Kutta methods only; {method} is none: use heun, rk3, rk4 or tsit5"
+            f"correctors exist for Runge-Kutta and exponential Adams methods; {method} is none: use heun, rk3, rk4, tsit5 or etdabm3"
         )
     return found
 
