@@ -201,7 +201,7 @@ def test_a_run_under_constant_wind_equals_one_under_the_same_wind_as_a_series():
         ({"mode": "hybird"}, "unknown mode 'hybird'; did you mean 'hybrid'"),
         ({"method": "rk3"}, "was trained for heun, the campaign uses rk3"),
         ({"step": 0.01}, "trained for step 0.02 s, the campaign uses 0.01 s"),
-        ({"method": "ab4"}, "a corrector needs a Runge-Kutta method"),
+        ({"method": "ab4"}, "a corrector needs a Runge-Kutta or an exponential Adams method"),
     ],
 )
 def test_a_run_that_does_not_fit_the_corrector_is_refused(change, words):

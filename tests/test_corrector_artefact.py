@@ -89,7 +89,7 @@ def rewritten(path, change):
         (lambda h, t: h["guard"].update(norm="euclid"), "norm must be one of max, rms"),
         (lambda h, t: h["guard"].update(kappa=0.5), "kappa must be at least 1"),
         (lambda h, t: h.update(history=9), "look back 9 steps do not exist"),
-        (lambda h, t: h.update(method="ab4"), "Runge-Kutta methods only"),
+        (lambda h, t: h.update(method="ab4"), "Runge-Kutta and exponential Adams methods"),
         (lambda h, t: h.update(method="hein"), "unknown integrator 'hein'; did you mean 'heun'"),
     ],
 )

@@ -65,7 +65,9 @@ def test_the_kernel_applies_the_network_that_was_trained(trained, turbine):
     np.testing.assert_allclose(run.state[1], expected, rtol=1e-12, atol=1e-15)
 
 
-def test_the_hybrid_trusts_the_network_where_the_discrepancy_is_within_the_limit_as_on_most_training_steps(trained, turbine):
+def test_the_hybrid_trusts_the_network_where_the_discrepancy_is_within_the_limit_as_on_most_training_steps(
+    trained, turbine
+):
     corrector, _ = trained
     samples, _ = sample_sets(parse_recipe(TINY), turbine, initial_state)
     wind = ConstantWind(8.0)

@@ -3,11 +3,14 @@
 name          of the artefact: `NAME.safetensors` beside the recipe
 family        `affine`: the defect is an affine map of the features (`features`); with `factors` one that varies with them
 turbine       `nrel5mw` (default), `t2b1i1cg` or the path of a turbine YAML
-method, step  the Runge-Kutta method and its step [s]
+method, step  the Runge-Kutta or exponential Adams method and its step [s]
 factors       of `sin_azimuth`, `cos_azimuth`, `wind_speed@start`, `rotor_speed`; default none
-history       earlier steps that the map looks back to (default 0)
+history       earlier steps that the map looks back to (default 0); of an exponential Adams method the earlier nonlinear parts that it
+              sees, at least the method's own
+generator_damping  of an exponential Adams method: added to the linear part's [1/s] (default 0)
 training      winds, see below; `validation`: other winds, for the figures of the card
-samples       single steps per wind (default 500); half of them `perturbation` (1e-5 of each state's deviation) off the trajectory
+samples       single steps per wind (default 500); half of them `perturbation` (1e-5 of each state's deviation) off the trajectory;
+              those of an exponential Adams method lie on it
 ridge         of the fit, relative to unit features (default 1e-12)
 seed          of the samples (default 0)
 guard         norm (`max`, `rms`), kappa (2), quantile (0.999; 1: the largest), rtol (0), substeps (fallback; default as needed)
@@ -117,6 +120,7 @@ class AffineRecipe(_Part):
     step: float = Field(gt=0, le=1)
     factors: list[str] = []
     history: int = Field(default=0, ge=0, le=features.MOST_HISTORY)
+    generator_damping: float = Field(default=0.0, ge=0, lt=100)
     training: Winds
     validation: Winds
     initial: Literal["operating-point", "paper", "paper-spinning"] = "operating-point"
@@ -142,6 +146,22 @@ class AffineRecipe(_Part):
         except InputError as error:
             raise ValueError(str(error)) from None
         return value
+
+    @model_validator(mode="after")
+    def _fits_the_method(self) -> AffineRecipe:
+        exponential = isinstance(samples.base_method(self.method), ExponentialAdams)
+        if exponential:
+            try:
+                features.multi_blade_factors(tuple(self.factors))
+            except InputError as error:
+                raise ValueError(str(error)) from None
+            if self.guard.substeps:
+                raise ValueError(
+                    f"guard.substeps: the fallback of {self.method} is the method itself; leave it out"
+                )
+        elif self.generator_damping:
+            raise ValueError(f"generator_damping: {self.method} has no linear part; leave it out")
+        return self
 
     @model_validator(mode="after")
     def _validation_unseen(self) -> AffineRecipe:
@@ -188,7 +208,11 @@ def train_affine(
     begin = time.perf_counter()
     if isinstance(samples.base_method(recipe.method), ExponentialAdams):
         made_here = exponential_adams.train(
-            recipe, turbine, lambda blowing: starts(turbine, blowing, recipe.initial, initial_state), say, text
+            recipe,
+            turbine,
+            lambda blowing: starts(turbine, blowing, recipe.initial, initial_state),
+            say,
+            text,
         )
         say("validation")
         return replace(made_here, validation=validate(made_here, recipe, turbine, initial_state))

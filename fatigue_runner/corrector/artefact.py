@@ -64,7 +64,8 @@ class Corrector:
 
     linear (16, k) or None acts on `features.names(kind, stages, factors, history)`; layers: (outputs, inputs + 1) matrices, the
     bias first, on the same features without factors; their sum is h^(p+1) N divided by h^(p+1). An exponential Adams method has a
-    `predictor` (16, k) beside, in the same units, on the rows that are known before the evaluation of the step.
+    `predictor` (16, k) beside, in the same units, on the rows that are known before the evaluation of the step;
+    `damping` [1/s] is added to the generator's in its linear part; `ahead_atol` (16,) is the guard's atol for the predictor's result.
     """
 
     name: str
@@ -86,6 +87,8 @@ class Corrector:
     licence: str = "Apache-2.0"
     history: int = 0
     predictor: Array | None = None
+    damping: float = 0.0
+    ahead_atol: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         self._check_kind()
@@ -124,6 +127,14 @@ class Corrector:
         from fatigue_runner.integrators.exponential_adams import MOST_PAST, PARTS, base_rows
 
         feature_names.multi_blade_factors(self.factors)
+        if len(self.ahead_atol) != 16 or not all(a > 0 for a in self.ahead_atol):
+            raise CorrectorError(
+                f"corrector {self.name}: ahead_atol needs 16 positive numbers, to guard the predictor"
+            )
+        if not 0 <= self.damping < 100:
+            raise CorrectorError(
+                f"corrector {self.name}: the generator's damping must be a number from 0 to 100 1/s"
+            )
         if not 0 <= self.history <= MOST_PAST or self.layers or self.linear is None or self.predictor is None:
             raise CorrectorError(
                 f"corrector {self.name}: one of an exponential method is two matrices that look back {MOST_PAST} steps at most"
@@ -294,6 +305,7 @@ def load(path: Path | str) -> Corrector:
         }
         header["guard"] = Guard(**guard)
         header["wind_range"], header["factors"] = tuple(header["wind_range"]), tuple(header["factors"])
+        header["ahead_atol"] = tuple(header.get("ahead_atol", ()))
         layers = tuple(tensors[f"layer{i}"].astype(float) for i in range(count))
         linear, predictor = (
             tensors[key].astype(float) if key in tensors else None for key in ("linear", "predictor")

@@ -20,7 +20,11 @@ _LABELS = {
 def summary(corrector: Corrector) -> list[tuple[str, str]]:
     """(label, value) pairs of what a person asks first."""
     guard = corrector.guard
-    fallback = f"{guard.substeps} substeps of {corrector.method}" if guard.substeps else "the method of the next order"
+    fallback = (
+        f"{guard.substeps} substeps of {corrector.method}"
+        if guard.substeps
+        else "the method of the next order"
+    )
     if corrector.past:
         fallback = f"{corrector.method} as it is"
     looks = f", looks back {corrector.history} step(s)" if corrector.history else ""

@@ -41,7 +41,7 @@ class Correcting:
         if self.past:
             from fatigue_runner.integrators import loops_exponential_adams as loops
 
-            inputs = adams.base_rows(self.past) * (1 + len(self.network[3]))
+            inputs = adams.base_rows(self.past) * (1 + len(self.network[4]))
             return loops.exponential_adams, loops.working_arrays(start, self.past, inputs, aligned)
         from fatigue_runner.integrators.corrected import corrected_steps, working_arrays
 
@@ -61,23 +61,25 @@ def prepare_exponential(
     """An exponential Adams method at this step and pitch [rad], plain (corrector None) or with a learned part. Raises as `prepare`."""
     if corrector is None:
         ahead, plain = adams.matrices(turbine, method, step, pitch, method.past)
-        network = adams.network(ahead, plain, plain)
+        network = adams.network((ahead, ahead), (plain, plain))
         data = adams.loop_data(turbine, pitch, method.past)
         return Correcting(data, network, adams.unguarded(), np.nan, 0, method.past)
     if mode not in MODES:
         raise InputError(f"unknown mode {mode!r}{did_you_mean(mode, MODES)}")
     corrector.bind(turbine, method.name, step)
     past = corrector.past
-    ahead, plain = adams.matrices(turbine, method, step, pitch, past)
+    ahead, plain = adams.matrices(turbine, method, step, pitch, past, corrector.damping)
     learned_ahead, learned, factors = corrector.matrices()
     whole = learned.copy()
     whole[:, : plain.shape[1]] += plain
     guard = corrector.guard
-    safety = (mode == "hybrid", np.array(guard.atol), np.array(guard.rtol), float(guard.limit), _norm(guard))
+    safety = (
+        mode == "hybrid", np.array(corrector.ahead_atol), np.array(guard.atol), np.array(guard.rtol), float(guard.limit), _norm(guard),
+    )  # fmt: skip
     more = method.evaluations(1000, past) - method.evaluations(1000)
     return Correcting(
-        adams.loop_data(turbine, pitch, past), adams.network(ahead + learned_ahead, whole, plain, factors), safety,
-        float(guard.limit), 0, past, more,
+        adams.loop_data(turbine, pitch, past, corrector.damping), adams.network((ahead + learned_ahead, ahead), (whole, plain), factors),
+        safety, float(guard.limit), 0, past, more,
     )  # fmt: skip
 
 
@@ -125,6 +127,4 @@ def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: floa
     )
     network = corrector.kernel_network(turbine.parameters["g_ratio"])
     at_start = STARTING * stages - 1
-    return Correcting(
-        (*data[:2], rows), network, safety, float(guard.limit), extra, extra_at_start=at_start
-    )
+    return Correcting((*data[:2], rows), network, safety, float(guard.limit), extra, extra_at_start=at_start)

@@ -53,12 +53,13 @@ def features(x, k, stage_rows, h, ratio, start, middle, end, rows):
         rows[26 * LANES + j] = 1.0 - 2.0 * double * double
     for i in range(len(stage_rows)):
         s = stage_rows[i]
-        first = (FIXED_ROWS + 8 * i) * LANES
+        # unsigned: numba's check for negative places keeps LLVM from vectorising
+        first = np.uint64((FIXED_ROWS + 8 * i) * LANES)
         for m in range(7 * LANES):
-            rows[first + m] = h * k[s, 8 * LANES + m]
+            rows[first + np.uint64(m)] = h * k[s, 8 * LANES + m]
         for j in range(LANES):
             slip = k[s, 14 * LANES + j] - k[s, 15 * LANES + j] * inverse
-            rows[first + 7 * LANES + j] = h * slip
+            rows[first + np.uint64(7 * LANES + j)] = h * slip
 
 
 @njit(**FAST)
@@ -70,16 +71,6 @@ def remember(stages, history, rows):
     if history > 0:
         for m in range(8 * LANES):
             rows[first + m] = rows[FIXED_ROWS * LANES + m]
-
-
-@njit(**FAST)
-def multiply(count, factors, rows):
-    """Append rows 0..count times row `factors[i]`, for every i."""
-    for f in range(len(factors)):
-        first, factor = (f + 1) * count * LANES, factors[f] * LANES
-        for i in range(count):
-            for j in range(LANES):
-                rows[first + i * LANES + j] = rows[i * LANES + j] * rows[factor + j]
 
 
 @intrinsic
@@ -150,6 +141,50 @@ def pack(weights: np.ndarray) -> tuple[np.ndarray, int]:
     padded = np.zeros((blocks * BLOCK, n_in))
     padded[:n_out] = weights
     return np.ascontiguousarray(padded.reshape(blocks, BLOCK, n_in).transpose(0, 2, 1)).ravel(), blocks
+
+
+@intrinsic
+def times_row(typing_context, rows, first, count, factor):
+    """rows[first : first + count] = rows[: count] times row `factor`, all (LANES,); in vector types, since LLVM cannot know that the
+    rows of one array do not overlap (measured: 16 instead of 2 ns a lane for 59 rows)."""
+    array = types.Array(types.float64, 1, "C")
+    signature = types.void(array, types.int64, types.int64, types.int64)
+    vector = ir.VectorType(ir.DoubleType(), VECTOR)
+
+    def codegen(context, builder, sig, args):
+        data = context.make_array(sig.args[0])(context, builder, args[0]).data
+        word = ir.IntType(64)
+        lanes = word(LANES)
+
+        def at(index):
+            return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
+
+        def place(row, part):
+            return builder.add(builder.mul(row, lanes), word(part * VECTOR))
+
+        parts = range(LANES // VECTOR)
+        by = [builder.load(at(place(args[3], p))) for p in parts]
+        for value in by:
+            value.align = 8
+        with cgutils.for_range(builder, args[2]) as row:
+            for p in parts:
+                value = builder.load(at(place(row.index, p)))
+                value.align = 8
+                target = at(place(builder.add(args[1], row.index), p))
+                builder.store(builder.fmul(value, by[p]), target).align = 8
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+_times_row: Any = times_row  # its first argument is supplied by numba
+
+
+@njit(**FAST)
+def multiply(count, factors, rows):
+    """Append rows 0..count times row `factors[i]`, for every i."""
+    for f in range(len(factors)):
+        _times_row(rows, (f + 1) * count, count, factors[f])
 
 
 RAW_ROWS = 18  # 1, the 16 states as they are, the wind speed: what the paper's network sees

@@ -55,7 +55,9 @@ class ExponentialAdams:
         return None
 
 
-_SOURCE = "exponential Adams-Bashforth-Moulton, PEC; Hochbruck & Ostermann (2011), doi:10.1007/s11075-010-9408-y"
+_SOURCE = (
+    "exponential Adams-Bashforth-Moulton, PEC; Hochbruck & Ostermann (2011), doi:10.1007/s11075-010-9408-y"
+)
 ETDABM3 = ExponentialAdams("etdabm3", 3, _SOURCE, 2, 2)
 ETDABM4 = ExponentialAdams("etdabm4", 4, _SOURCE, 3, 3)
 
@@ -75,7 +77,11 @@ def to_multi_blade(rows: int, first: tuple[int, ...]) -> Array:
     return out
 
 
-T_STATE, T_RELATIVE, T_PARTS = to_multi_blade(16, (2, 10)), to_multi_blade(15, (2, 9)), to_multi_blade(8, (2,))
+T_STATE, T_RELATIVE, T_PARTS = (
+    to_multi_blade(16, (2, 10)),
+    to_multi_blade(15, (2, 9)),
+    to_multi_blade(8, (2,)),
+)
 
 
 @dataclass(frozen=True)
@@ -89,10 +95,16 @@ class Linear:
 
 
 @lru_cache(maxsize=64)
-def linear(turbine: Turbine, pitch: float) -> Linear:
-    """The linear part as it looks from every azimuth alike, to rounding: what the average leaves of a coupling is dropped."""
+def linear(turbine: Turbine, pitch: float, damping: float = 0.0) -> Linear:
+    """The linear part as it looks from every azimuth alike, to rounding: what the average leaves of a coupling is dropped.
+
+    damping [1/s]: added to the generator's. The torque law's line of region 2.5 is 5/s steeper than region 2, and with A of region 2
+    steps above 0.1 s are unstable there; between the two both are stable (measured), and a learned part makes up for the accuracy.
+    """
     ratio = turbine.parameters["g_ratio"]
-    a = T_STATE @ linear_part(turbine, pitch) @ np.linalg.inv(T_STATE)
+    own = linear_part(turbine, pitch).copy()
+    own[15, 15] -= damping
+    a = T_STATE @ own @ np.linalg.inv(T_STATE)
     turning = np.zeros(16, bool)
     turning[[3, 4, 11, 12]] = True
     a[np.ix_(turning, ~turning)] = 0.0
@@ -131,10 +143,10 @@ def weights(a: Array, step: float, nodes: list[int]) -> list[Array]:
 
 @lru_cache(maxsize=256)
 def matrices(
-    turbine: Turbine, method: ExponentialAdams, step: float, pitch: float, past: int
+    turbine: Turbine, method: ExponentialAdams, step: float, pitch: float, past: int, damping: float = 0.0
 ) -> tuple[Array, Array]:
     """Predictor (16, rows before the new part) and corrector (16, `base_rows`) on the rows of a step, in multi-blade coordinates."""
-    line = linear(turbine, pitch)
+    line = linear(turbine, pitch, damping)
     spread = _parts_to_state(turbine.parameters["g_ratio"])
     back = np.linalg.inv(T_RELATIVE), np.linalg.inv(T_PARTS)
     rows = base_rows(past)
@@ -152,25 +164,26 @@ def matrices(
     return np.ascontiguousarray(predictor), put([1, *(-j for j in range(method.past))])
 
 
-def loop_data(turbine: Turbine, pitch: float, past: int) -> tuple[Any, ...]:
+def loop_data(turbine: Turbine, pitch: float, past: int, damping: float = 0.0) -> tuple[Any, ...]:
     """`method` of the compiled loop: A of the accelerations, ratio of the gearbox, earlier parts, RK4 and its sub-steps for the start."""
     from fatigue_runner.integrators.correction import pack
     from fatigue_runner.integrators.kernel_data import runge_kutta_data
     from fatigue_runner.integrators.tableaux import RK4
 
-    low = pack(linear(turbine, pitch).low)[0]
+    low = pack(linear(turbine, pitch, damping).low)[0]
     return low, turbine.parameters["g_ratio"], past, runge_kutta_data(RK4)[:2], STARTING
 
 
 def network(
-    predictor: Array, corrector: Array, plain: Array, factors: tuple[int, ...] = ()
+    predictors: tuple[Array, Array], correctors: tuple[Array, Array], factors: tuple[int, ...] = ()
 ) -> tuple[Any, ...]:
-    """`network` of the compiled loop: weights of predictor, corrector and the plain corrector, and the rows that multiply all rows."""
+    """`network` of the compiled loop: weights of predictor and corrector, those of the plain ones, and the rows that multiply all rows."""
     from fatigue_runner.integrators.correction import pack
 
-    return pack(predictor)[0], pack(corrector)[0], pack(plain)[0], np.array(factors, dtype=np.int64)
+    packed = (pack(weights)[0] for weights in (*predictors, *correctors))
+    return (*packed, np.array(factors, dtype=np.int64))
 
 
 def unguarded() -> tuple[Any, ...]:
     """`safety` of a run without a learned part."""
-    return False, np.ones(16), np.zeros(16), 0.0, 0
+    return False, np.ones(16), np.ones(16), np.zeros(16), 0.0, 0

@@ -13,7 +13,7 @@ import numpy as np
 
 from fatigue_runner.compiled import FAST, njit
 from fatigue_runner.integrators import correction
-from fatigue_runner.integrators.corrected import add, guard, keep_largest, subtract
+from fatigue_runner.integrators.corrected import guard, subtract
 from fatigue_runner.integrators.correction import multiply
 from fatigue_runner.integrators.defects import integrate
 from fatigue_runner.integrators.exponential_adams import PARTS, PAST_ROW, STATE_ROW, WIND_ROW
@@ -51,7 +51,9 @@ def sine_cosine(x, turned):
         sine = ((((-sine * y - 1 / 39916800) * y + 1 / 362880) * y - 1 / 5040) * y + 1 / 120) * y - 1 / 6
         sine = q + q * y * sine
         cosine = 1 / 20922789888000 * y - 1 / 87178291200
-        cosine = ((((cosine * y + 1 / 479001600) * y - 1 / 3628800) * y + 1 / 40320) * y - 1 / 720) * y + 1 / 24
+        cosine = (
+            (((cosine * y + 1 / 479001600) * y - 1 / 3628800) * y + 1 / 40320) * y - 1 / 720
+        ) * y + 1 / 24
         cosine = 1.0 - 0.5 * y + y * y * cosine
         double = 2.0 * sine * cosine
         cosine = 1.0 - 2.0 * sine * sine
@@ -103,13 +105,20 @@ def wind_row(p, rows, to):
 
 @njit(**FAST)
 def part_rows(ring, line, turned, rows, to):
-    """Rows `to` on = nonlinear part `line` of the ring, turned."""
-    first = line * PARTS
+    """Rows `to` on = nonlinear part `line` of the ring, turned; unsigned places: numba's check for negative ones costs the vectors."""
+    first = np.uint64(to * LANES)
     for m in range(2 * LANES):
-        rows[to * LANES + m] = ring[first * LANES + m]
-    to_fixed(ring, first + 2, turned, rows, to + 2)
+        rows[first + np.uint64(m)] = ring[line, m]
     for m in range(3 * LANES):
-        rows[(to + 5) * LANES + m] = ring[(first + 5) * LANES + m]
+        rows[first + np.uint64(5 * LANES + m)] = ring[line, 5 * LANES + m]
+    for j in range(LANES):
+        one, two, three = ring[line, 2 * LANES + j], ring[line, 3 * LANES + j], ring[line, 4 * LANES + j]
+        along = (2.0 * one - two - three) * (1.0 / 3.0)
+        across = (two - three) * (2.0 / 3.0 * SIN60)
+        sine, cosine = turned[j], turned[LANES + j]
+        rows[first + np.uint64(2 * LANES + j)] = (one + two + three) * (1.0 / 3.0)
+        rows[first + np.uint64(3 * LANES + j)] = cosine * along - sine * across
+        rows[first + np.uint64(4 * LANES + j)] = sine * along + cosine * across
 
 
 @njit(**FAST)
@@ -148,12 +157,11 @@ def relative(x, inverse, rows):
 @njit(**FAST)
 def nonlinear_part(slope, product, inverse, ring, line):
     """ring[line] = the accelerations in `slope` without their linear part `product`; the twist's in place of the generator's."""
-    first = line * PART
     for m in range(7 * LANES):
-        ring[first + m] = slope[HALF + m] - product[m]
+        ring[line, m] = slope[HALF + m] - product[m]
     for j in range(LANES):
         twist = slope[14 * LANES + j] - slope[15 * LANES + j] * inverse
-        ring[first + 7 * LANES + j] = twist - product[7 * LANES + j]
+        ring[line, 7 * LANES + j] = twist - product[7 * LANES + j]
 
 
 @njit(**FAST)
@@ -166,30 +174,44 @@ def shifted_slope(slope, shift, ratio, k, line):
         k[line, 15 * LANES + j] = slope[15 * LANES + j] + change
 
 
+@njit(**FAST)
+def keep_largest_distance(a, b, largest):
+    """largest = max(largest, |a - b|)"""
+    for m in range(WIDTH):
+        largest[m] = max(largest[m], abs(a[m] - b[m]))
+
+
 @njit(nogil=True, error_model="numpy")
 def forget_infinite(ring):
     """Nonlinear parts of a lane that has diverged must not reach it again after its restart: a strict function, NaN counts."""
-    for m in range(len(ring)):
-        if not abs(ring[m]) < 1e30:
-            ring[m] = 0.0
+    for line in range(ring.shape[0]):
+        for m in range(ring.shape[1]):
+            if not abs(ring[line, m]) < 1e30:
+                ring[line, m] = 0.0
 
 
 @njit(**FAST)
 def exponential_adams(
     h, steps, method, network, safety, wind, model, plan, work, rows, status, diverged_at, clamped
 ):
-    """Advance one group; method, network, safety as `exponential_adams.loop_data`, `network` and (hybrid, atol, rtol, limit, norm).
+    """Advance one group; method, network, safety as `exponential_adams.loop_data`, `network` and (hybrid, atol of the
+    predictor, atol, rtol, limit, norm): both the predictor's and the corrector's learned part are guarded.
 
-    work = `working_arrays`; status = (accepted, discrepancy, local error) (n - 1, LANES), the worst of each output interval; the local error
-    is the distance of the predictor's result from the corrector's. The rest as in `loops`.
+    work = `working_arrays`; status = (accepted, discrepancy, local error) (n - 1, LANES), the worst of each output interval; the local
+    error is the distance of the predictor's result from the corrector's. The rest as in `loops`.
     """
     low, ratio, past, starting, substeps = method
-    ahead_weights, weights, plain_weights, factors = network
-    hybrid, atol, rtol, limit, norm = safety
+    ahead_weights, plain_ahead_weights, weights, plain_weights, factors = network
+    hybrid, ahead_atol, atol, rtol, limit, norm = safety
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     out_step, exact, position, velocity = plan
-    (states, k, restart, current, slope, ahead, fixed, other, change, largest), (p, start, middle), (seen, ring, turned, rel, product), inner = work
+    (
+        (states, k, restart, current, slope, ahead, fixed, other, change, largest),
+        (p, start, middle),
+        (seen, ring, turned, rel, product),
+        inner,
+    ) = work
     inner_k, inner_p, inner_stage, inner_slope, inner_states = inner
     accepted_out, discrepancy_out, error_out = status
     discrepancy, accepted = np.zeros(LANES), np.ones(LANES, np.bool_)
@@ -234,7 +256,14 @@ def exponential_adams(
             for i in range(past):
                 part_rows(ring, (newest - i) % (past + 1), turned, seen, PAST_ROW + PARTS * i)
             dense(seen, ahead_weights, new_row, BLOCKS, change)
-            advanced(current, change, turned, ahead)
+            if hybrid:
+                # a wrong place of the evaluation would spoil the fallback, too
+                advanced(current, change, turned, fixed)
+                dense(seen, plain_ahead_weights, new_row, BLOCKS, change)
+                advanced(current, change, turned, other)
+                guard(ahead, other, fixed, ahead_atol, rtol, limit, norm, accepted, discrepancy)
+            else:
+                advanced(current, change, turned, ahead)
         _rhs(ahead, p, slope, 0, tables, cells, constants, scratch, row, clamped)
         relative(ahead, inverse, rel)
         dense(rel, low, 15, 1, product)
@@ -252,16 +281,17 @@ def exponential_adams(
             else:
                 for m in range(WIDTH):
                     current[m] = fixed[m]
-            subtract(current, ahead, change)
-            keep_largest(change, largest)
+            keep_largest_distance(current, ahead, largest)
         if not all_fine(current):
             all_diverged = mark_diverged(current, (n + 1) * h, diverged_at, restart)
             forget_infinite(ring)
         keep(current, states, new)
-        subtract(current, ahead, change)
-        relative(change, inverse, rel)
-        dense(rel, low, 15, 1, product)
-        shifted_slope(slope, product, ratio, k, new)
+        # the output interpolates through three step ends at most
+        if output < len(out_step) and out_step[output] <= n + 3:
+            subtract(current, ahead, change)
+            relative(change, inverse, rel)
+            dense(rel, low, 15, 1, product)
+            shifted_slope(slope, product, ratio, k, new)
         for m in range(WIND):
             start[m] = p[m]
         now, newest, first = new, line, output
@@ -288,9 +318,9 @@ def working_arrays(start, past, inputs, aligned):
     wide = [aligned(np.zeros(WIDTH)) for _ in range(6)]  # slope, ahead, fixed, other, change, largest
     states, k = aligned(np.stack([start] * 3)), aligned(np.zeros((3, WIDTH)))
     winds = tuple(aligned(np.zeros(WIND)) for _ in range(3))
-    buffers = tuple(
-        aligned(np.zeros(size * LANES)) for size in (inputs, PARTS * (past + 1), 2, 15, PARTS)
-    )  # fmt: skip
+    ring = aligned(np.zeros((past + 1, PART)))
+    seen, turned, rel, product = (aligned(np.zeros(size * LANES)) for size in (inputs, 2, 15, PARTS))
+    buffers = (seen, ring, turned, rel, product)
     inner = (
         aligned(np.zeros((6, WIDTH))), aligned(np.zeros(WIND)), aligned(np.zeros(WIDTH)), aligned(np.zeros(WIDTH)),
         aligned(np.zeros((3, WIDTH))),
