@@ -158,6 +158,22 @@ def test_missing_viewer_is_said_before_anything_runs(monkeypatch):
         live.watcher()
 
 
+def test_live_view_without_a_display_is_refused_before_anything_is_written(tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    from fatigue_runner.cli import app
+
+    monkeypatch.setattr(live, "require_rerun", lambda: None)
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    campaign = tmp_path / "a.yaml"
+    campaign.write_text("name: a\n")
+    done = CliRunner().invoke(app, ["run", str(campaign), "--live", "--out", str(tmp_path / "run")])
+    assert isinstance(done.exception, InputError) and done.exception.exit_code == 2
+    assert "no display" in str(done.exception) and not (tmp_path / "run").exists()
+
+
 # --- the process beside the run, in all that can happen to its viewer
 
 
