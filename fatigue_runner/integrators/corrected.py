@@ -32,27 +32,48 @@ MOST_ROWS = 512  # of features with their factors, and of a hidden layer
 
 
 @njit(nogil=True, error_model="numpy")
-def guard(x, fallback, corrected, atol, rtol, limit, norm, accepted, discrepancy):
+def guard(x, fallback, corrected, units, limit, norm, scaled, accepted, discrepancy):
     """x = corrected where its scaled distance from the fallback is within the limit, else the fallback; per lane.
 
-    Compiled without fastmath: a comparison with NaN must be false, so that a NaN correction is refused.
+    units = (1 / atol (WIDTH,), rtol / atol (WIDTH,) or nothing). Compiled without fastmath: a comparison with NaN must be false, so
+    that a NaN correction is refused. scaled (WIDTH,): room. Loops over whole states with one result each, and halves against each
+    other instead of a loop over the states: so they vectorise.
     """
+    inverse, relative = units
+    if len(relative) == 0:
+        for m in range(WIDTH):
+            scaled[m] = abs(corrected[m] - fallback[m]) * inverse[m]
+    else:
+        for m in range(WIDTH):
+            scale = 1.0 + max(abs(x[m]), abs(fallback[m])) * relative[m]
+            scaled[m] = abs(corrected[m] - fallback[m]) * inverse[m] / scale
+    for m in range(WIDTH):
+        size = scaled[m]
+        scaled[m] = size if size < np.inf else np.inf
+    if norm == NORM_RMS:
+        for m in range(WIDTH):
+            scaled[m] *= scaled[m] * 0.0625
+        for half in (8, 4, 2, 1):
+            for m in range(half * LANES):
+                scaled[m] += scaled[half * LANES + m]
+        for j in range(LANES):
+            scaled[j] = np.sqrt(scaled[j])
+    else:
+        for half in (8, 4, 2, 1):
+            for m in range(half * LANES):
+                size, other = scaled[m], scaled[half * LANES + m]
+                scaled[m] = size if size > other else other
     for j in range(LANES):
-        total = 0.0
-        finite = True
-        for i in range(16):
-            m = i * LANES + j
-            scale = atol[i] + max(abs(x[m]), abs(fallback[m])) * rtol[i]
-            d = abs(corrected[m] - fallback[m]) / scale
-            finite = finite and d < np.inf
-            total = max(total, d) if norm == NORM_MAX else total + d * d / 16.0
-        size = (total if norm == NORM_MAX else np.sqrt(total)) if finite else np.inf
-        ok = size <= limit
-        accepted[j] = accepted[j] and ok
-        discrepancy[j] = max(discrepancy[j], size)
-        for i in range(16):
-            m = i * LANES + j
-            x[m] = corrected[m] if ok else fallback[m]
+        before, size = discrepancy[j], scaled[j]
+        discrepancy[j] = before if before > size else size
+        accepted[j] = accepted[j] & (size <= limit)
+    for half in (1, 2, 4, 8):
+        for m in range(half * LANES):
+            scaled[half * LANES + m] = scaled[m]
+    for m in range(WIDTH):
+        # both are read first: so the choice is a vector's, not a branch
+        good, safe = corrected[m], fallback[m]
+        x[m] = good if scaled[m] <= limit else safe
 
 
 @njit(**FAST)
@@ -130,12 +151,12 @@ def corrected_steps(
     """Advance one group by `steps` corrected steps of size h, as `loops.runge_kutta`, and
 
     method = (stage table, result table, rows of the stage slopes); network as `correction.correction`;
-    safety = (hybrid, fallback, atol (16,), rtol (16,), limit, norm); work = `working_arrays`. A network that looks back at
+    safety = (hybrid, fallback, `correcting.guard_units`, limit, norm); work = `working_arrays`. A network that looks back at
     earlier steps begins when it can: until then the fallback steps.
     status = (accepted, discrepancy, local error) (n - 1, LANES) are written: the worst of each output interval.
     """
     (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), stage_rows = method
-    hybrid, fallback, atol, rtol, limit, norm = safety
+    hybrid, fallback, units, limit, norm = safety
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     out_step, exact, position, velocity = plan
@@ -147,7 +168,7 @@ def corrected_steps(
     ) = work
     features, hidden = buffers
     accepted_out, discrepancy_out, error_out = status
-    discrepancy, accepted = np.zeros(LANES), np.ones(LANES, np.bool_)
+    discrepancy, accepted, scaled = np.zeros(LANES), np.ones(LANES, np.bool_), np.zeros(WIDTH)
     now, output, all_diverged, history = 0, 1, False, network[2]
 
     keep(restart, rows, 0)
@@ -178,7 +199,7 @@ def corrected_steps(
                 move(other, current)
             else:
                 add(plain, defect, fixed)
-                guard(current, other, fixed, atol, rtol, limit, norm, accepted, discrepancy)
+                guard(current, other, fixed, units, limit, norm, scaled, accepted, discrepancy)
             # the logged error estimate is the embedded one, not the learned one
             subtract(other, plain, defect)
         else:

@@ -63,7 +63,8 @@ def prepare_exponential(
         ahead, plain = adams.matrices(turbine, method, step, pitch, method.past)
         network = adams.network((ahead, ahead), (plain, plain))
         data = adams.loop_data(turbine, pitch, method.past)
-        return Correcting(data, network, adams.unguarded(), np.nan, 0, method.past)
+        units = guard_units((1.0,) * 16, (0.0,) * 16)
+        return Correcting(data, network, (False, units, units, 0.0, 0), np.nan, 0, method.past)
     if mode not in MODES:
         raise InputError(f"unknown mode {mode!r}{did_you_mean(mode, MODES)}")
     corrector.bind(turbine, method.name, step)
@@ -73,14 +74,21 @@ def prepare_exponential(
     whole = learned.copy()
     whole[:, : plain.shape[1]] += plain
     guard = corrector.guard
-    safety = (
-        mode == "hybrid", np.array(corrector.ahead_atol), np.array(guard.atol), np.array(guard.rtol), float(guard.limit), _norm(guard),
-    )  # fmt: skip
+    units = guard_units(corrector.ahead_atol, guard.rtol), guard_units(guard.atol, guard.rtol)
+    safety = (mode == "hybrid", *units, float(guard.limit), _norm(guard))
     more = method.evaluations(1000, past) - method.evaluations(1000)
     return Correcting(
         adams.loop_data(turbine, pitch, past, corrector.damping), adams.network((ahead + learned_ahead, ahead), (whole, plain), factors),
         safety, float(guard.limit), 0, past, more,
     )  # fmt: skip
+
+
+def guard_units(atol: tuple[float, ...], rtol: tuple[float, ...]) -> tuple[Any, Any]:
+    """`units` of the compiled guard: 1 / atol and, where there is any, rtol / atol of the 16 states, repeated for the lanes."""
+    from fatigue_runner.turbine.generated.kernel import LANES
+
+    inverse = 1.0 / np.repeat(np.array(atol), LANES)
+    return inverse, np.repeat(np.array(rtol), LANES) * inverse if any(rtol) else np.zeros(0)
 
 
 def _norm(guard: Any) -> int:
@@ -117,14 +125,8 @@ def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: floa
         again = runge_kutta_data(method)
         fallback = (*again[:2], 0, guard.substeps)
         extra = guard.substeps * stages - 1
-    safety = (
-        mode == "hybrid",
-        fallback,
-        np.array(guard.atol),
-        np.array(guard.rtol),
-        float(guard.limit),
-        _norm(guard),
-    )
+    units = guard_units(guard.atol, guard.rtol)
+    safety = (mode == "hybrid", fallback, units, float(guard.limit), _norm(guard))
     network = corrector.kernel_network(turbine.parameters["g_ratio"])
     at_start = STARTING * stages - 1
     return Correcting((*data[:2], rows), network, safety, float(guard.limit), extra, extra_at_start=at_start)

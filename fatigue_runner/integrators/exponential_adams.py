@@ -182,8 +182,3 @@ def network(
 
     packed = (pack(weights)[0] for weights in (*predictors, *correctors))
     return (*packed, np.array(factors, dtype=np.int64))
-
-
-def unguarded() -> tuple[Any, ...]:
-    """`safety` of a run without a learned part."""
-    return False, np.ones(16), np.ones(16), np.zeros(16), 0.0, 0

@@ -194,15 +194,15 @@ def forget_infinite(ring):
 def exponential_adams(
     h, steps, method, network, safety, wind, model, plan, work, rows, status, diverged_at, clamped
 ):
-    """Advance one group; method, network, safety as `exponential_adams.loop_data`, `network` and (hybrid, atol of the
-    predictor, atol, rtol, limit, norm): both the predictor's and the corrector's learned part are guarded.
+    """Advance one group; method, network, safety as `exponential_adams.loop_data`, `network` and (hybrid, the guard's
+    units for predictor and corrector, limit, norm): both the predictor's and the corrector's learned part are guarded.
 
     work = `working_arrays`; status = (accepted, discrepancy, local error) (n - 1, LANES), the worst of each output interval; the local
     error is the distance of the predictor's result from the corrector's. The rest as in `loops`.
     """
     low, ratio, past, starting, substeps = method
     ahead_weights, plain_ahead_weights, weights, plain_weights, factors = network
-    hybrid, ahead_atol, atol, rtol, limit, norm = safety
+    hybrid, ahead_units, units, limit, norm = safety
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     out_step, exact, position, velocity = plan
@@ -214,7 +214,7 @@ def exponential_adams(
     ) = work
     inner_k, inner_p, inner_stage, inner_slope, inner_states = inner
     accepted_out, discrepancy_out, error_out = status
-    discrepancy, accepted = np.zeros(LANES), np.ones(LANES, np.bool_)
+    discrepancy, accepted, scaled = np.zeros(LANES), np.ones(LANES, np.bool_), np.zeros(WIDTH)
     inverse = 1.0 / ratio
     new_row = PAST_ROW + PARTS * past
     count = new_row + PARTS
@@ -261,7 +261,7 @@ def exponential_adams(
                 advanced(current, change, turned, fixed)
                 dense(seen, plain_ahead_weights, new_row, BLOCKS, change)
                 advanced(current, change, turned, other)
-                guard(ahead, other, fixed, ahead_atol, rtol, limit, norm, accepted, discrepancy)
+                guard(ahead, other, fixed, ahead_units, limit, norm, scaled, accepted, discrepancy)
             else:
                 advanced(current, change, turned, ahead)
         _rhs(ahead, p, slope, 0, tables, cells, constants, scratch, row, clamped)
@@ -277,7 +277,7 @@ def exponential_adams(
             if hybrid:
                 dense(seen, plain_weights, count, BLOCKS, change)
                 advanced(current, change, turned, other)
-                guard(current, other, fixed, atol, rtol, limit, norm, accepted, discrepancy)
+                guard(current, other, fixed, units, limit, norm, scaled, accepted, discrepancy)
             else:
                 for m in range(WIDTH):
                     current[m] = fixed[m]
