@@ -59,7 +59,7 @@ def test_the_table_has_costs_errors_and_a_verdict_per_integrator(world, call, tm
 def test_progress_is_told_line_by_line_where_there_is_no_terminal(world, call, tmp_path):
     _, out, _ = call("run", write_campaign(tmp_path))
     told = [line.strip() for line in out.splitlines() if line.strip().endswith("...")]
-    assert [line.split()[0] for line in told] == ["reading", "loading", "running", "writing"]
+    assert [line.split()[0] for line in told] == ["reading", "loading", "checking", "running", "writing"]
 
 
 def test_run_into_the_same_folder_says_what_it_kept(world, call, tmp_path):

@@ -20,7 +20,7 @@ METHOD_COLOURS = (
     "#999999", "#D55E00", "#E69F00", "#CC79A7", "#882255", "#0072B2", "#56B4E9", "#009E73", "#332288", "#999933", "#AA4499", "#1a1a1a",
     "#117733", "#CC6677", "#44AA99",
 )  # fmt: skip
-METHOD_MARKERS = "os^DvPhp<>d8H"
+METHOD_MARKERS: tuple[Any, ...] = (*"os^DvPhp<>d8H", (4, 1, 0), (6, 1, 0))
 
 
 def looks(points: Iterable[Point]) -> dict[str, dict[str, Any]]:

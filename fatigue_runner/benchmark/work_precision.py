@@ -13,11 +13,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from fatigue_runner.benchmark import adaptive, machine
 from fatigue_runner.benchmark.cases import Cases, Settings
@@ -227,10 +226,7 @@ def identity(sets: Sequence[Cases], settings: Settings) -> str:
         )
         for entry in fitting(cases, settings)[0]:
             if entry.corrector is not None:
-                arrays = [a for a in (entry.corrector.linear, *entry.corrector.layers) if a is not None]
-                digest.update(
-                    entry.label.encode() + b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)
-                )
+                digest.update(entry.label.encode() + pickle.dumps(entry.corrector))
     return digest.hexdigest()[:16]
 
 
