@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -201,18 +202,26 @@ def test_bridge_of_a_campaign_that_was_refused_ends():
 
 
 @pytest.mark.parametrize(
-    ("workers", "done", "elapsed", "over", "opens"),
+    ("workers", "done", "elapsed", "over", "gone", "opens"),
     [
-        (1, 0, 0.0, False, True),  # cores to spare
-        (3, 0, 1.0, False, False),  # too early to tell
-        (3, 5, 5.0, False, False),  # 20 cases in 20 s: opening a viewer would cost it more than a percent
-        (3, 5, 16.0, False, True),  # 20 cases in 64 s
-        (3, 0, 31.0, False, True),  # no case in half a minute
-        (3, 5, 5.0, True, True),  # the run is over
+        (1, 0, 0.0, False, False, True),  # cores to spare
+        (3, 0, 1.0, False, False, False),  # too early to tell
+        (
+            3,
+            5,
+            5.0,
+            False,
+            False,
+            False,
+        ),  # 20 cases in 20 s: opening a viewer would cost it more than a percent
+        (3, 5, 16.0, False, False, True),  # 20 cases in 64 s
+        (3, 0, 31.0, False, False, True),  # no case in half a minute
+        (3, 5, 5.0, True, False, False),  # the cases have run, the report is being written
+        (3, 5, 5.0, True, True, True),  # the program is gone
     ],
 )
 def test_viewer_opens_at_once_only_where_that_costs_the_run_nothing_that_counts(
-    tmp_path, monkeypatch, workers, done, elapsed, over, opens
+    tmp_path, monkeypatch, workers, done, elapsed, over, gone, opens
 ):
     monkeypatch.setattr(bridge, "cores", lambda: 4)
     append(tmp_path, record("kept of an earlier run"))
@@ -220,7 +229,10 @@ def test_viewer_opens_at_once_only_where_that_costs_the_run_nothing_that_counts(
     room = bridge.Room(told, 1000.0)
     if done:
         append(tmp_path, *(record(f"a{i}") for i in range(done)))
-    assert room.is_there(1000.0 + elapsed, over) is opens
+    assert room.is_there(1000.0 + elapsed, over, gone) is opens
+    assert not over or room.is_there(1000.0 + elapsed + bridge.REPORT_SECONDS, over, gone), (
+        "it opens in any case"
+    )
 
 
 def test_bridge_that_waits_has_loaded_nothing_that_takes_time():
@@ -295,7 +307,8 @@ def run(folder: Path, watch=None) -> dict[str, str]:
     from fatigue_runner.campaign import run_campaign
     from fatigue_runner.logbook import read_log
 
-    results = run_campaign(CAMPAIGN, folder, watch=watch)
+    with watch or nullcontext():
+        results = run_campaign(CAMPAIGN, folder, watch=watch)
     assert results.exit_code == 0
     out = {}
     for row in results:

@@ -1,7 +1,7 @@
 """What it costs a campaign to be watched: the same campaign without and with `--live`, in turn, in one run.
 
 Both cores are busy all the time, which is the worst that can happen: what the bridge and the viewer take is taken from the workers.
-The bridge opens the viewer with the end of a campaign that is as short as this one; with `at_once` it opens it as soon as the cases
+The bridge opens the viewer after a campaign that is as short as this one; with `at_once` it opens it as soon as the cases
 run, as in a campaign of minutes, and what that costs in seconds is what such a campaign loses.
 
 In each round every situation runs once. Clocks are compared with the mean of the two unwatched runs of the same round; how far those

@@ -8,13 +8,14 @@ shows.
 
 Even a process of the idle class costs those that work something: a worker that wakes up on its core waits for the next tick of the
 clock, milliseconds, where the kernel is a server's. So where all cores are busy, and the campaign is so short that opening a viewer
-would cost it more than a percent, the viewer opens with its end. Until then this process has loaded nothing and sleeps.
+would cost it more than a percent, the viewer opens with the program's end. Until then this process has loaded nothing and sleeps.
 """
 
 from __future__ import annotations
 
 import faulthandler
 import json
+import math
 import os
 import select
 import socket
@@ -32,6 +33,7 @@ CONNECT_SECONDS = 30.0
 START_SECONDS = 900.0  # loading Rerun when nothing else wants to run can take minutes
 LONG_RUN = 60.0  # s; opening a viewer takes some 2 s of a core, and those that work lose a fifth of that
 UNKNOWN_RUN = 30.0  # s without a finished case after which a run counts as long
+REPORT_SECONDS = 20.0  # after the last case, for the report that is written then
 SPARE_CORES = 2  # beside the workers': one for the run's own process, one for the viewer
 
 
@@ -63,12 +65,19 @@ class Room:
         self._records = Path(told.folder) / "cases.jsonl"
         self._pending = sum(map(len, told.jobs))
         self._before, self._began = self._lines(), now
+        self._over = math.inf
         self.spare = cores() - told.workers >= SPARE_CORES
 
-    def is_there(self, now: float, over: bool) -> bool:
-        """Yes where cores are idle, where the run is over, and where it takes so long that opening a viewer hardly counts."""
-        if over or self.spare:
+    def is_there(self, now: float, over: bool, gone: bool) -> bool:
+        """Yes where cores are idle, where the program is gone, and where the run takes so long that opening a viewer hardly counts.
+
+        over: the cases have run.
+        """
+        if gone or self.spare:
             return True
+        if over:
+            self._over = min(self._over, now)
+            return now - self._over >= REPORT_SECONDS
         elapsed, done = now - self._began, self._lines() - self._before
         if done <= 0:
             return elapsed >= UNKNOWN_RUN
@@ -98,7 +107,7 @@ def main(look: Look, handle: int) -> None:
         file.seek(0)
         told = Watched(**json.load(file))
     room = Room(told, time.monotonic())
-    while not look.at_once and not room.is_there(time.monotonic(), ear.over):
+    while not look.at_once and not room.is_there(time.monotonic(), ear.over, ear.gone):
         ear.wait(0.5)
     heartbeat(START_SECONDS)
     port = look.port or window.free_port()
