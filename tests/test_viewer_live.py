@@ -172,7 +172,8 @@ def test_live_view_without_a_display_is_refused_before_anything_is_written(tmp_p
     campaign.write_text("name: a\n")
     done = CliRunner().invoke(app, ["run", str(campaign), "--live", "--out", str(tmp_path / "run")])
     assert isinstance(done.exception, InputError) and done.exception.exit_code == 2
-    assert "no display" in str(done.exception) and not (tmp_path / "run").exists()
+    assert "no display" in str(done.exception) and "--viewer-port 9876" in str(done.exception)
+    assert not (tmp_path / "run").exists()
 
 
 # --- the process beside the run, in all that can happen to its viewer

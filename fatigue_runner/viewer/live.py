@@ -102,7 +102,9 @@ def watcher(
         raise InputError(f"--pace must be above 0 (1 is real time), got {pace:g}")
     require_rerun()
     if port is None:
-        require_display()
+        require_display(
+            "start `rerun --serve-web --bind 127.0.0.1` for a browser and give --viewer-port 9876, or run without --live"
+        )
     return Watcher(Look(pace, case, scale, port), say)
 
 

@@ -182,14 +182,14 @@ def require_rerun() -> None:
         raise InputError(f"the viewer is not installed; install it with {INSTALL}")
 
 
-def require_display() -> None:
-    """Raises InputError where no window can be opened."""
+def require_display(
+    way_out: str = "use --web and a browser, or --save FILE.rrd and open that elsewhere",
+) -> None:
+    """Raises InputError, with the way out, where no window can be opened."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
-        raise InputError(
-            "there is no display to open a window on; use --web and a browser, or --save FILE.rrd and open that elsewhere"
-        )
+        raise InputError(f"there is no display to open a window on; {way_out}")
 
 
 def require_free(port: int) -> None:
