@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fatigue_runner.api import (
         ConstantWind,
+        PitchSeries,
         SeriesWind,
         StepWind,
         TurbulentWind,
@@ -30,6 +31,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "ConstantWind",
+    "PitchSeries",
     "SeriesWind",
     "StepWind",
     "TurbulentWind",

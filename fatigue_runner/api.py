@@ -12,6 +12,7 @@ from fatigue_runner.campaign.spec import INITIAL_STATES
 from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.fatigue import damage_equivalent_load, rainflow
+from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind, SeriesWind, StepWind, TurbulentWind, WindSource
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ConstantWind",
+    "PitchSeries",
     "SeriesWind",
     "StepWind",
     "TurbulentWind",
@@ -40,7 +42,7 @@ def simulate(
     duration: float = 60.0,
     initial: str | Any = "operating-point",
     output_step: float | None = None,
-    pitch: float = 0.0,
+    pitch: float | PitchSeries = 0.0,
     corrector: Any = None,
     mode: str = "enhanced",
 ) -> Trajectory:
@@ -48,10 +50,10 @@ def simulate(
 
     turbine: of `load_turbine`, or a name for it; wind: a wind source, or a constant speed [m/s]; step,
     duration [s]; initial: "operating-point", "paper", "paper-spinning" or a state (16,); output_step [s]:
-    None samples every step, else the solution is interpolated; pitch [rad]. A case that diverges ends early:
-    see `diverged_at`. corrector: a name of `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid",
-    which guards it. Raises InputError for an unknown method or turbine, a step that is not positive and a
-    malformed state.
+    None samples every step, else the solution is interpolated; pitch [rad]: a number, or a PitchSeries for a
+    pitch that varies in time. A case that diverges ends early: see `diverged_at`. corrector: a name of
+    `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid", which guards it. Raises InputError
+    for an unknown method or turbine, a step that is not positive and a malformed state.
     """
     from fatigue_runner.integrators import METHODS, simulate_block
 
@@ -64,7 +66,7 @@ def simulate(
     for name, value in (("step", step), ("duration", duration), ("output_step", output_step)):
         if value is not None and not value > 0:
             raise InputError(f"{name} must be above 0 s, got {value!r}")
-    start = _state(turbine, initial, wind, pitch)
+    start = _state(turbine, initial, wind, first_pitch(pitch))
     if corrector is not None:
         from fatigue_runner.corrector import find
 

@@ -143,7 +143,7 @@ def simulate(
         initial,
         campaign.duration,
         1.0 / campaign.output_rate,
-        pitch=float(np.deg2rad(campaign.pitch)),
+        pitch=campaign.blade_pitch,
         corrector=_corrector(integration.file, integration.digest) if integration.file else None,
         mode=integration.mode or "enhanced",
     )

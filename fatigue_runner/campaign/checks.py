@@ -11,7 +11,7 @@ import numpy as np
 from fatigue_runner.campaign.cases import Integration, WindCase, integrations, resolve
 from fatigue_runner.campaign.initial import initial_state
 from fatigue_runner.campaign.source import Source
-from fatigue_runner.campaign.spec import Campaign
+from fatigue_runner.campaign.spec import Campaign, Pitch
 from fatigue_runner.errors import InputError, did_you_mean
 
 # Above this the tip-speed ratio of a 5-MW-sized rotor leaves the aerodynamic tables for good.
@@ -35,9 +35,16 @@ def load_turbine(campaign: Campaign, source: Source) -> Any:
 
 
 def check_pitch(campaign: Campaign, turbine: Any, source: Source) -> None:
-    """Raise InputError, with the line, for a pitch outside the aerodynamic tables."""
+    """Raise InputError, with the line, for a pitch outside the aerodynamic tables, or a schedule that is too short or does not fit."""
+    from fatigue_runner.integrators.pitch import PitchSeries
+
     try:
-        turbine.kernel_data(float(np.deg2rad(campaign.pitch)))
+        pitch = campaign.blade_pitch
+        if isinstance(pitch, PitchSeries):
+            pitch.cells(turbine, campaign.duration)
+            turbine.pitched_kernel_data()
+        else:
+            turbine.kernel_data(pitch)
     except InputError as error:
         raise InputError(f"{source.where(('pitch',))}: {error}") from None
 
@@ -51,6 +58,8 @@ def check_integrators(campaign: Campaign, turbine: Any, source: Source) -> None:
             where = source.where((*integration.path, "method"))
             hint = did_you_mean(integration.method, integrators.METHODS)
             raise InputError(f"{where}: unknown integrator {integration.method!r}{hint}")
+        if isinstance(campaign.pitch, Pitch):
+            _check_varying_pitch(integration, source)
         if integration.corrector:
             # it may hold a step that the method alone does not; its own binding says what it fits
             _check_corrector(integration, turbine, source)
@@ -60,6 +69,19 @@ def check_integrators(campaign: Campaign, turbine: Any, source: Source) -> None:
             raise InputError(
                 f"{source.where((*integration.path, 'step'))}: {_unstable(integration, limit, turbine)}"
             )
+
+
+def _check_varying_pitch(integration: Integration, source: Source) -> None:
+    from fatigue_runner.integrators import method
+    from fatigue_runner.integrators.multistep import LinearMultistep
+    from fatigue_runner.integrators.tableaux import ButcherTableau
+
+    if integration.corrector or not isinstance(method(integration.method), ButcherTableau | LinearMultistep):
+        what = f"corrector {integration.corrector}" if integration.corrector else integration.method
+        raise InputError(
+            f"{source.where(integration.path)}: {what} is made for one pitch; with a pitch that varies in time use "
+            "Runge-Kutta and Adams methods without corrector"
+        )
 
 
 def _check_corrector(integration: Integration, turbine: Any, source: Source) -> None:
@@ -125,9 +147,11 @@ def initial_states(
 
     Found here, once per mean wind, so that a wind without one is refused before anything runs.
     """
+    from fatigue_runner.integrators.pitch import first_pitch
+
     found: dict[Any, np.ndarray] = {}
     states = {}
-    pitch = float(np.deg2rad(campaign.pitch))
+    pitch = first_pitch(campaign.blade_pitch)
     for case, wind in zip(cases, winds, strict=True):
         label = wind.label
         key = wind.mean_speed, label.get("vertical_shear"), label.get("horizontal_shear")

@@ -130,7 +130,7 @@ def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
     return {
         "wind_source": case.wind.kind,
         "wind_speed": known(label["wind_speed"]),
-        "pitch_deg": campaign.pitch,
+        "pitch_deg": campaign.pitch if isinstance(campaign.pitch, float) else None,
         **{name: known(label.get(name)) for name in names},
     }
 

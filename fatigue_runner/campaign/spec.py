@@ -5,7 +5,8 @@ turbine         `nrel5mw` (default), `t2b1i1cg` (the paper's: no tilt, no cone) 
 duration        simulated time of every case [s]
 output_rate     samples per second [Hz] of what is counted, compared and logged (default 50), at any step
 initial         state at t = 0: `operating-point` (default), `paper`, `paper-spinning`, or 16 numbers
-pitch           blade pitch [deg], the same for all cases (default 0)
+pitch           blade pitch [deg], the same for all cases (default 0); or {time: [s], angle: [deg]}, a smooth curve through samples
+                at equal steps from 0 to at least `duration` (not for correctors and exponential methods)
 discard         seconds dropped from the start before statistics, fatigue and errors (default 0)
 workers         parallel processes (default 2; `--workers` overrides it)
 
@@ -40,12 +41,13 @@ A sweep is a number, a list of numbers, {start, stop, step}, {start, stop, count
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
     AfterValidator,
     BeforeValidator,
     Field,
+    PlainSerializer,
     PlainValidator,
     ValidationError,
     field_validator,
@@ -56,7 +58,10 @@ from fatigue_runner.campaign.section import Section, input_error, problem
 from fatigue_runner.campaign.source import Source
 from fatigue_runner.campaign.sweep import Piece, Sweep, as_list, check_not_empty, expand
 from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
-from fatigue_runner.errors import did_you_mean
+from fatigue_runner.errors import InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from fatigue_runner.integrators.pitch import PitchSeries
 
 INITIAL_STATES = ("operating-point", "paper", "paper-spinning")
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
@@ -219,6 +224,42 @@ class Log(Section):
         return channels
 
 
+class Pitch(Section):
+    """A pitch that varies in time: cubic spline through the samples; pitch rate and acceleration are neglected."""
+
+    time: list[float] = Field(min_length=2)
+    angle: list[float] = Field(min_length=2)
+
+    @model_validator(mode="after")
+    def _is_a_series(self) -> Pitch:
+        try:
+            self.series()
+        except InputError as error:
+            raise problem(str(error)) from None
+        return self
+
+    def series(self) -> PitchSeries:
+        """The schedule for the integrators; raises InputError for uneven times."""
+        from fatigue_runner.integrators.pitch import PitchSeries
+
+        return PitchSeries(self.time, [math.radians(x) for x in self.angle])
+
+
+def _pitch(value: Any) -> Any:
+    """A number or the section `Pitch`, told apart here, so that an error speaks of one of the two only."""
+    if isinstance(value, dict | Pitch):
+        return Pitch.model_validate(value)
+    if not _is_number(value):
+        raise problem(
+            f"must be a number of degrees or a section with the keys time, angle; got {value!r:.60}"
+        )
+    return float(value)
+
+
+def _plain_pitch(pitch: float | Pitch) -> Any:
+    return pitch.model_dump() if isinstance(pitch, Pitch) else pitch
+
+
 class Campaign(Section):
     """A whole campaign file; see the module's text for every key."""
 
@@ -227,7 +268,7 @@ class Campaign(Section):
     duration: float = Field(gt=0, le=1e5)
     output_rate: float = Field(default=50.0, gt=0, le=10_000)
     initial: Annotated[str | list[float], PlainValidator(_initial_state)] = "operating-point"
-    pitch: float = 0.0
+    pitch: Annotated[float | Pitch, PlainValidator(_pitch), PlainSerializer(_plain_pitch)] = 0.0
     discard: float = Field(default=0.0, ge=0)
     workers: int = Field(default=2, ge=1, le=1024)
     wind: Wind
@@ -235,6 +276,11 @@ class Campaign(Section):
     reference: Reference | None = Reference()
     fatigue: Fatigue = Fatigue()
     log: Log = Log()
+
+    @property
+    def blade_pitch(self) -> float | PitchSeries:
+        """The pitch [rad] as the integrators take it."""
+        return self.pitch.series() if isinstance(self.pitch, Pitch) else math.radians(self.pitch)
 
     @model_validator(mode="after")
     def _times_fit(self) -> Campaign:

@@ -87,7 +87,7 @@ class _Block:
         campaign = self.plan.campaign
         runs = simulate_block(
             self.plan.turbine, method, step, self.winds, self.initial, self.duration, 1.0 / campaign.output_rate,
-            pitch=float(np.deg2rad(campaign.pitch)),
+            pitch=campaign.blade_pitch,
         )  # fmt: skip
         lost = [r.diverged_at for r in runs if r.diverged_at is not None]
         if lost:

@@ -19,6 +19,7 @@ from fatigue_runner.integrators.methods import Method
 from fatigue_runner.integrators.methods import method as find_method
 from fatigue_runner.integrators.multistep import LinearMultistep
 from fatigue_runner.integrators.output import OutputPlan, plan_output
+from fatigue_runner.integrators.pitch import PitchSeries
 from fatigue_runner.integrators.tableaux import ButcherTableau
 from fatigue_runner.trajectory import Trajectory
 
@@ -38,13 +39,14 @@ def simulate_block(
     initial: Array,
     duration: float,
     output_step: float | None = None,
-    pitch: float = 0.0,
+    pitch: float | PitchSeries = 0.0,
     corrector: Any = None,
     mode: str = "enhanced",
 ) -> list[Trajectory]:
     """Simulate n cases in lockstep, SIMD across cases; a case's result does not depend on the others.
 
-    step, duration, output_step [s] (None: output at every step); winds: n wind sources; initial (n, 16); pitch [rad].
+    step, duration, output_step [s] (None: output at every step); winds: n wind sources; initial (n, 16); pitch [rad]: a number
+    or a PitchSeries, which is the same for all cases and not for correctors and exponential methods.
     `corrector`: a corrector.Corrector of this turbine, method and step; `mode`: enhanced, or hybrid, which guards it. The last step
     ends at or after `duration`. Raises InputError for impossible numbers.
     """
@@ -59,8 +61,16 @@ def simulate_block(
         )
     steps = int(np.ceil(duration / step - 1e-9))
     plan = plan_output(duration, step, steps, output_step, found.order)
+    exponential = isinstance(found, ExponentialAdams | ExponentialRungeKutta)
+    if isinstance(pitch, PitchSeries) and (corrector is not None or exponential):
+        what = found.name if corrector is None else f"corrector {corrector.name}"
+        raise InputError(
+            f"{what} is made for one pitch; with a pitch that varies in time use a Runge-Kutta or Adams method "
+            "without corrector"
+        )
     correcting = None
     if isinstance(found, ExponentialAdams):
+        assert not isinstance(pitch, PitchSeries)
         correcting = prepare_exponential(corrector, turbine, found, step, mode, pitch)
     elif corrector is not None:
         if not isinstance(found, ButcherTableau):
@@ -114,18 +124,21 @@ def _run(turbine, method, correcting, step, steps, winds, initial, plan, pitch) 
     from fatigue_runner.turbine.lanes import LANES, to_groups
     from fatigue_runner.wind import stack_cells
 
-    data, prepared = turbine.kernel_data(pitch), _prepare(turbine, method, step, pitch)
+    varying = isinstance(pitch, PitchSeries)
+    pitch_cells = pitch.cells(turbine, steps * step) if varying else None
+    data = turbine.pitched_kernel_data() if varying else turbine.kernel_data(pitch)
+    prepared = _prepare(turbine, method, step, pitch)
     cell_duration, cells = stack_cells(winds, float(plan.time[-1]))
     groups = to_groups(np.ascontiguousarray(initial.T))
     # one group's cells: (n_cells, 4, 3 * LANES)
     blocks = to_groups(cells.reshape(-1, len(winds))).reshape(len(groups), len(cells), 4, -1)
     out: list[Trajectory] = []
     for number, (x, wind_cells) in enumerate(zip(groups, blocks, strict=True)):
-        group = _run_group(prepared, correcting, step, steps, x, (cell_duration, wind_cells), data, plan)
+        wind = (cell_duration, wind_cells, pitch_cells)
+        group = _run_group(prepared, correcting, step, steps, x, wind, data, plan)
         lanes = min(LANES, len(winds) - number * LANES)
         states = np.ascontiguousarray(group.rows.reshape(-1, 16, LANES).transpose(2, 0, 1)[:lanes])
         for lane in range(lanes):
-            wind = winds[number * LANES + lane]
             out.append(
                 _trajectory(
                     turbine,
@@ -133,7 +146,7 @@ def _run(turbine, method, correcting, step, steps, winds, initial, plan, pitch) 
                     correcting,
                     step,
                     steps,
-                    wind,
+                    winds[number * LANES + lane],
                     states[lane],
                     group,
                     lane,
@@ -145,7 +158,7 @@ def _run(turbine, method, correcting, step, steps, winds, initial, plan, pitch) 
     return out
 
 
-def _prepare(turbine: Turbine, method: Method, step: float, pitch: float) -> tuple[Any, Any, int]:
+def _prepare(turbine: Turbine, method: Method, step: float, pitch: Any) -> tuple[Any, Any, int]:
     """The compiled loop of a method, what it reads of the method, and the rows of slopes that it keeps."""
     from fatigue_runner.integrators import loops
     from fatigue_runner.integrators.kernel_data import multistep_data, runge_kutta_data, slope_rows
@@ -181,10 +194,12 @@ def _run_group(
     from fatigue_runner.turbine.lanes import LANES, work_space
 
     advance, method_data, slopes = prepared
-    cell_duration, cells = wind
-    changing = bool(np.any(cells[:, 1:])) or len(cells) > 1
+    cell_duration, cells, pitch_cells = wind
+    changing = pitch_cells is not None or bool(np.any(cells[:, 1:])) or len(cells) > 1
     scratch, row, clamped = (aligned(a) for a in work_space())
-    model = (aligned(data.tables), data.cells, data.constants, scratch, row)
+    # (1, n) tables of a varying pitch are large, and aligned from the start
+    tables = aligned(data.tables) if data.tables.ndim == 1 else data.tables
+    model = (tables, data.cells, data.constants, scratch, row)
     # a lane that is no number would stay so: it runs on from rest, its result is not used
     fine = np.isfinite(x.reshape(16, LANES)).all(axis=0)
     start = np.where(np.tile(fine, 16), x, 0.0)
@@ -192,7 +207,7 @@ def _run_group(
     states = aligned(np.stack([start, start, start]))
     flat = [aligned(np.zeros(width)) for _ in range(3)]  # stage, slope, largest error
     k = aligned(np.zeros((slopes, width)))
-    work = (states, k, aligned(np.zeros(3 * LANES)), *flat, aligned(start))
+    work = (states, k, aligned(np.zeros((3 if pitch_cells is None else 4) * LANES)), *flat, aligned(start))
     group = _Group(
         _output_rows(len(plan.time), width),
         np.full((len(plan.time) - 1, LANES), np.nan),
@@ -203,7 +218,8 @@ def _run_group(
         0.0,
     )
     plan_data = (plan.step, plan.exact, plan.position, plan.velocity)
-    wind_data = (cell_duration, aligned(cells), changing)
+    all_cells = aligned(cells) if pitch_cells is None else (aligned(cells), *pitch_cells)
+    wind_data = (cell_duration, all_cells, changing)
     if correcting is None:
         loop: Any = advance
         arguments: tuple[Any, ...] = (
@@ -241,7 +257,9 @@ def _trajectory(
         time=time_points,
         state=state,
         wind=signals,
-        loads=turbine.loads(state, signals, pitch),
+        loads=turbine.loads(
+            state, signals, pitch.at(time_points) if isinstance(pitch, PitchSeries) else pitch
+        ),
         accepted=group.accepted[: n - 1, lane].copy(),
         discrepancy=group.discrepancy[: n - 1, lane].copy() if hybrid else np.full(n - 1, np.nan),
         threshold=np.full(n - 1, correcting.limit if hybrid else np.nan),

@@ -1,6 +1,6 @@
 """The compiled time loops: Runge-Kutta and linear multistep, one group of LANES cases in lockstep.
 
-Arguments of both: h [s], steps; method: see `kernel_data`; wind = (cell duration, cells (n, 4, 3 LANES), changing); model =
+Arguments of both: h [s], steps; method: see `kernel_data`; wind = (cell duration, cells of `wind_at`, changing); model =
 (tables, cells, constants, scratch, row); plan = (step, exact, position, velocity) of `output.OutputPlan`; work = (states, k, p,
 stage, slope, largest, restart), the initial states (WIDTH,) in states[0]. Written: rows (n, WIDTH); errors (n - 1, LANES) where
 the method has an embedded one, the largest of each interval; `diverged_at` (LANES,), -1 or the time; clamped (LANES,).
@@ -22,9 +22,9 @@ from fatigue_runner.integrators.stepping import (
     wind_at,
     write_output,
 )
-from fatigue_runner.turbine.generated import kernel
+from fatigue_runner.turbine import model as turbine_model
 
-_rhs = kernel.rhs
+_rhs = turbine_model.rhs
 
 # Rows 0 to 2 of `k` are a ring of the slopes at the last three step ends, which the output interpolates; stage i has row 2 + i.
 RING = 3

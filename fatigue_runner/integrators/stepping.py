@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numba.core import types
+from numba.extending import overload
 
 from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.integrators.vectors import WIDTH, stage_sum
@@ -65,13 +67,50 @@ def mark_diverged(x, time, diverged_at, restart):
 
 
 @njit(**LEAN)
-def wind_at(time, cell_duration, cells, p):
-    """Piecewise cubic wind signals: cells (n, 4, WIND) -> p (WIND,)."""
+def _wind_cells(time, cell_duration, cells, p):
     # 0.3 / 0.1 is 2.9999999999999996: a step time belongs to the cell that begins there
     i = min(max(int(time / cell_duration + 1e-9), 0), cells.shape[0] - 1)
     u = time - i * cell_duration
     for m in range(WIND):
         p[m] = ((cells[i, 3, m] * u + cells[i, 2, m]) * u + cells[i, 1, m]) * u + cells[i, 0, m]
+
+
+@njit(**LEAN)
+def _pitch_cells(time, cell_duration, cells, p):
+    i = min(max(int(time / cell_duration + 1e-9), 0), cells.shape[0] - 1)
+    u = time - i * cell_duration
+    pitch = ((cells[i, 3] * u + cells[i, 2]) * u + cells[i, 1]) * u + cells[i, 0]
+    for m in range(WIND, WIND + LANES):
+        p[m] = pitch
+
+
+def _signals(time, cell_duration, cells, p):
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_signals, inline="always")
+def _signals_by_type(time, cell_duration, cells, p):
+    if isinstance(cells, types.Array):
+
+        def wind(time, cell_duration, cells, p):
+            _wind_cells(time, cell_duration, cells, p)
+
+        return wind
+
+    def wind_and_pitch(time, cell_duration, cells, p):
+        _wind_cells(time, cell_duration, cells[0], p)
+        _pitch_cells(time, cells[1], cells[2], p)
+
+    return wind_and_pitch
+
+
+@njit(**LEAN)
+def wind_at(time, cell_duration, cells, p):
+    """Piecewise cubic wind signals: cells (n, 4, WIND) -> p (WIND,).
+
+    Where the pitch varies, cells = (wind cells, duration of the pitch's cells, its cells (n, 4)) and p (WIND + LANES,).
+    """
+    _signals(time, cell_duration, cells, p)
 
 
 _combined: Any = stage_sum(None)  # intrinsics, whose first argument numba supplies

@@ -31,12 +31,16 @@ _OPERATORS = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv
 
 @dataclass(frozen=True)
 class Code:
-    """text: the assignments. The name `place` is looked up in cubic cells and gives `tables`, the names of columns 0, 1, ..."""
+    """text: the assignments. The name `place` is looked up in cubic cells and gives `tables`, the names of columns 0, 1, ...
+
+    With `second`, the name of another place that is assigned before, the cells are bicubic.
+    """
 
     text: str
     place: str
     tables: Sequence[str]
     width: int  # columns of a cell, a multiple of VECTOR
+    second: str = ""
 
 
 def lane_kernel(code: Code, arrays: Sequence[str], lanes: int) -> Callable[..., Any]:
@@ -94,14 +98,14 @@ class _Emitter:
         self.column = {f"c_{name}": i for i, name in enumerate(code.tables)}
         self.lane: Any = None  # first lane of the current vector
         self.values: dict[str, Any] = {}
-        self.cells: list[tuple[Any, Any]] = []
+        self.cells: list[tuple[Any, list[Any]]] = []
 
     def run(self) -> None:
         statements = ast.parse(self.code.text).body
         together = 2 if self.lanes % (2 * self.size) == 0 else 1
         with cgutils.for_range(self.builder, _WORD(self.lanes // (together * self.size))) as loop:
             first = self.builder.mul(loop.index, _WORD(together * self.size))
-            vectors: list[tuple[Any, dict[str, Any], list[tuple[Any, Any]]]] = [
+            vectors: list[tuple[Any, dict[str, Any], list[tuple[Any, list[Any]]]]] = [
                 (self.builder.add(first, _WORD(i * self.size)), {}, []) for i in range(together)
             ]
             for statement in statements:
@@ -180,28 +184,42 @@ class _Emitter:
     def find_cells(self, value: Any) -> None:
         """Cell and place within it of every lane; what lies outside is clamped and counted."""
         b, tables = self.builder, self.data["tables"]
-        first, per_unit = (self.splat(b.load(b.gep(tables, [_WORD(i)])), self.size) for i in (0, 1))
+        words = ir.VectorType(_WORD, self.size)
+        cell, inside, outside = self.find(value, 0, self.data["cells"])
+        places = [inside]
+        if self.code.second:
+            count = b.fptosi(b.load(b.gep(tables, [_WORD(4)])), _WORD)
+            other, beside, beyond = self.find(self.values[self.code.second], 2, count)
+            cell = b.add(b.mul(other, self.splat(self.data["cells"], self.size)), cell)
+            places.append(beside)
+            outside = b.or_(outside, beyond)
+        counter = b.gep(self.data["clamped"], [self.lane])
+        self.store(b.add(self.load(counter, words), b.zext(outside, words)), counter)
+        terms = 4 ** len(places)
+        self.cells[:] = [
+            (
+                b.mul(b.extract_element(cell, _INDEX(j)), _WORD(terms * self.code.width)),
+                [self.splat(b.extract_element(x, _INDEX(j)), VECTOR) for x in places],
+            )
+            for j in range(self.size)
+        ]
+
+    def find(self, value: Any, header: int, count: Any) -> tuple[Any, Any, Any]:
+        """Cell, place in it (0 to 1) and whether `value` lies outside, on the grid that starts at tables[header]."""
+        b, tables = self.builder, self.data["tables"]
+        first, per_unit = (self.splat(b.load(b.gep(tables, [_WORD(header + i)])), self.size) for i in (0, 1))
         place = b.fmul(b.fsub(value, first), per_unit)
         # a diverged lane's NaN must not become a wild index: comparisons, numbers and integers are all clamped
         bounded = self.clamp(place, -1.0, 1.0e6)
         words = ir.VectorType(_WORD, self.size)
         cell = b.fptosi(bounded, words)
-        last = self.splat(b.sub(self.data["cells"], _WORD(1)), self.size)
+        last = self.splat(b.sub(count, _WORD(1)), self.size)
         zero = ir.Constant(words, [0] * self.size)
         cell = b.select(b.icmp_signed("<", cell, last), cell, last)
         cell = b.select(b.icmp_signed(">", cell, zero), cell, zero)
         number = b.sitofp(cell, self.vector)
         inside = self.clamp(b.fsub(place, number), 0.0, 1.0)
-        outside = b.fcmp_unordered("!=", place, b.fadd(number, inside))
-        counter = b.gep(self.data["clamped"], [self.lane])
-        self.store(b.add(self.load(counter, words), b.zext(outside, words)), counter)
-        self.cells[:] = [
-            (
-                b.mul(b.extract_element(cell, _INDEX(j)), _WORD(4 * self.code.width)),
-                self.splat(b.extract_element(inside, _INDEX(j)), VECTOR),
-            )
-            for j in range(self.size)
-        ]
+        return cell, inside, b.fcmp_unordered("!=", place, b.fadd(number, inside))
 
     def clamp(self, value: Any, low: float, high: float) -> Any:
         b, bottom, top = self.builder, self.number(low), self.number(high)
@@ -211,16 +229,23 @@ class _Emitter:
     def look_up(self, block: int) -> None:
         """The cubics of VECTOR tables: for each lane one vector across the tables, then transposed."""
         b, across = self.builder, ir.VectorType(_DOUBLE, VECTOR)
-        rows = []
-        for base, inside in self.cells:
+
+        def polynomial(base: Any, places: list[Any], first: int) -> Any:
+            """Horner's way; of two variables the last one's powers are the outer ones."""
+            if not places:
+                return self.load(b.gep(self.data["tables"], [b.add(base, _WORD(first))]), across)
+            inner = 4 ** (len(places) - 1) * self.code.width
             total = None
             for power in (3, 2, 1, 0):
-                place = b.add(base, _WORD(HEADER + power * self.code.width + block * VECTOR))
-                term = self.load(b.gep(self.data["tables"], [place]), across)
+                term = polynomial(base, places[:-1], first + power * inner)
                 total = (
-                    term if total is None else b.fadd(b.fmul(total, inside, flags=_FLAGS), term, flags=_FLAGS)
+                    term
+                    if total is None
+                    else b.fadd(b.fmul(total, places[-1], flags=_FLAGS), term, flags=_FLAGS)
                 )
-            rows.append(total)
+            return total
+
+        rows = [polynomial(base, places, HEADER + block * VECTOR) for base, places in self.cells]
         if self.size == 1:
             row = rows[0]
             columns = [self.splat(b.extract_element(row, _INDEX(i)), 1) for i in range(VECTOR)]

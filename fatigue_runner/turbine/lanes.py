@@ -10,25 +10,24 @@ from numpy.typing import NDArray
 from fatigue_runner.compiled import njit
 from fatigue_runner.turbine.generated import kernel
 from fatigue_runner.turbine.generated.kernel import LANES
+from fatigue_runner.turbine.model import loads, rhs
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine.turbine import KernelData
 
 Array = NDArray[np.float64]
 
-_rhs, _loads = kernel.rhs, kernel.loads
-
 
 @njit(nogil=True)
 def _evaluate(x, wind, tables, cells, constants, scratch, row, clamped, out):
     for group in range(x.shape[0]):
-        _rhs(x[group], wind[group], out[group], 0, tables, cells, constants, scratch, row, clamped)
+        rhs(x[group], wind[group], out[group], 0, tables, cells, constants, scratch, row, clamped)
 
 
 @njit(nogil=True)
 def _load_groups(x, wind, derivative, tables, cells, constants, scratch, row, clamped, out):
     for group in range(x.shape[0]):
-        _loads(
+        loads(
             x[group],
             wind[group],
             derivative[group],
@@ -64,7 +63,10 @@ def work_space() -> tuple[Array, Array, NDArray[np.int64]]:
 
 
 def evaluate(data: KernelData, columns: Array, wind: Array) -> tuple[Array, int]:
-    """State derivatives (16, n) of states (16, n) under wind (3, n), and the number of clamped table look-ups."""
+    """State derivatives (16, n) of states (16, n) under wind (3, n), and the number of clamped table look-ups.
+
+    With the data of a varying pitch, wind is (4, n), the pitch [rad] last.
+    """
     n = columns.shape[1]
     x, p = to_groups(columns), to_groups(wind)
     out = np.empty_like(x)
@@ -74,7 +76,7 @@ def evaluate(data: KernelData, columns: Array, wind: Array) -> tuple[Array, int]
 
 
 def load_channels(data: KernelData, state: Array, wind: Array) -> dict[str, Array]:
-    """Load channels {name: (n,)} of states (n, 16) under wind (n, 3)."""
+    """Load channels {name: (n,)} of states (n, 16) under wind (n, 3), or (n, 4) with the data of a varying pitch."""
     n = len(state)
     x, p = to_groups(np.ascontiguousarray(state.T)), to_groups(np.ascontiguousarray(wind.T))
     derivative = np.empty_like(x)

@@ -71,21 +71,64 @@ class AeroTables:
 
         Zero columns fill up the last group of eight.
         """
-        values = self.at_pitch(pitch, names)
-        values = np.pad(values, ((0, 0), (0, -len(names) % HEADER)))
-        step = float(self.tip_speed_ratio[1] - self.tip_speed_ratio[0])
-        powers = np.zeros((len(values) - 1, 4, values.shape[1]))
-        if self.interpolation == "bilinear":
-            powers[:, 0], powers[:, 1] = values[:-1], np.diff(values, axis=0)
-        else:
-            from scipy.interpolate import CubicSpline
+        powers = self._powers(self.at_pitch(pitch, names), len(names))
+        return np.concatenate([self._header(), powers.ravel()])
 
-            highest_first = CubicSpline(self.tip_speed_ratio, values).c
-            for power in range(4):
-                powers[:, power] = highest_first[3 - power] * step**power
+    def pitched_cells(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """The same over tip-speed ratio and pitch: per cell (pitch, ratio) the 16 coefficients w^a u^b, a the slower one.
+
+        The header goes on with the first pitch [rad], cells per radian and their number. The cells have the table's smallest pitch
+        step. Raises InputError where the others are no multiples of it.
+        """
+        steps = np.diff(self.pitch)
+        step = float(steps.min()) if len(steps) > 2 else 0.0
+        if not step or np.abs(steps / step - np.rint(steps / step)).max() > 1e-6:
+            raise InputError(
+                "pitch varying in time needs aerodynamic tables at four or more pitches, at multiples of one step"
+            )
+        nodes = np.stack([self._powers(self.at_pitch(p, names), len(names)) for p in self.pitch])
+        parts = self._along(nodes, self.pitch)
+        count = round(float(self.pitch[-1] - self.pitch[0]) / step)
+        starts = self.pitch[0] + step * np.arange(count)
+        parent = np.searchsorted(self.pitch, starts + step / 2) - 1
+        # place and width of the cell within its parent
+        at, width = (starts - self.pitch[parent]) / steps[parent], step / steps[parent]
+        at, width = (x.reshape(-1, *[1] * (nodes.ndim - 1)) for x in (at, width))
+        c0, c1, c2, c3 = (part[parent] for part in parts)
+        cells = ((c3 * at + c2) * at + c1) * at + c0, (3 * c3 * at + 2 * c2) * at + c1, 3 * c3 * at + c2, c3
+        header = self._header()
+        header[2:5] = self.pitch[0], 1.0 / step, count
+        # on a cache line from the start: copying megabytes for every block would cost as much as running it
+        size = HEADER + 4 * cells[0].size
+        room = np.empty(size + HEADER)
+        begin = -room.ctypes.data % 64 // 8
+        out = room[begin : begin + size]
+        out[:HEADER] = header
+        body = out[HEADER:].reshape(count, nodes.shape[1], 4, *nodes.shape[2:])
+        for power, values in enumerate(cells):
+            body[:, :, power] = values * width**power
+        return out
+
+    def _header(self) -> NDArray[np.float64]:
         header = np.zeros(HEADER)
-        header[:2] = self.tip_speed_ratio[0], 1.0 / step
-        return np.concatenate([header, powers.ravel()])
+        header[:2] = self.tip_speed_ratio[0], 1.0 / float(self.tip_speed_ratio[1] - self.tip_speed_ratio[0])
+        return header
+
+    def _powers(self, values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+        """(n - 1, 4, columns) coefficients of values (n, count) over the tip-speed ratio."""
+        padded = np.pad(values, ((0, 0), (0, -count % HEADER)))
+        return np.stack(self._along(padded, self.tip_speed_ratio), axis=1)
+
+    def _along(self, values: NDArray[np.float64], nodes: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """Coefficients of 1, u, u^2, u^3 (0 <= u <= 1 in every cell) along the first axis."""
+        if self.interpolation == "bilinear":
+            flat = np.zeros_like(values[:-1])
+            return [values[:-1], np.diff(values, axis=0), flat, flat]
+        from scipy.interpolate import CubicSpline
+
+        highest_first = CubicSpline(nodes, values).c
+        width = np.diff(nodes).reshape(-1, *[1] * (values.ndim - 1))
+        return [highest_first[3 - power] * width**power for power in range(4)]
 
 
 def read_tables(path: Path, interpolation: str) -> AeroTables:

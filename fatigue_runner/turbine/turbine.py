@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class KernelData:
-    """What the kernels read for one turbine at one pitch."""
+    """What the kernels read for one turbine at one pitch, or with the pitch as a fourth signal: then the tables are (1, n)."""
 
     constants: Array
     tables: Array  # of the equations
@@ -52,17 +52,43 @@ class Turbine:
         """Constants and table cells for the kernels; pitch [rad], positive to feather."""
         return _kernel_data(self, float(pitch))
 
+    def pitched_kernel_data(self) -> KernelData:
+        """The same for a pitch that varies in time. Raises InputError where the tables have too few pitches."""
+        return _pitched_kernel_data(self)
+
+    @property
+    def pitch_range(self) -> tuple[float, float]:
+        """Lowest and highest pitch of the aerodynamic tables [rad]."""
+        return float(self.tables.pitch[0]), float(self.tables.pitch[-1])
+
+    @property
+    def rotor_radius(self) -> float:
+        """R of the tip-speed ratio and the shears: the tips' distance from the shaft [m]."""
+        return self.parameters["radius"]
+
+    @property
+    def gearbox_ratio(self) -> float:
+        """Generator speed over rotor speed [-]."""
+        return self.parameters["g_ratio"]
+
+    @property
+    def hub_height(self) -> float:
+        """Height of the rotor apex above the tower base [m]."""
+        p = self.parameters
+        return p["t_h"] + p["tower_to_shaft"] + p["overhang"] * p["sin_tilt"]
+
     def rhs(
         self,
         state: ArrayLike,
         wind: ArrayLike,
         vertical_shear: ArrayLike = 0.0,
         horizontal_shear: ArrayLike = 0.0,
-        pitch: float = 0.0,
+        pitch: ArrayLike = 0.0,
     ) -> Array:
         """Time derivative of the state; (16,) or (16, n) -> the same shape.
 
-        wind [m/s], shears [-]: numbers or (n,); pitch [rad]. Raises InputError for another shape.
+        wind [m/s], shears [-]: numbers or (n,); pitch [rad]: a number, or (n,), which takes the kernel for a varying pitch.
+        Raises InputError for another shape.
         """
         from fatigue_runner.turbine.lanes import evaluate
 
@@ -70,19 +96,24 @@ class Turbine:
         if x.ndim not in (1, 2) or x.shape[0] != 16:
             raise InputError(f"state must have shape (16,) or (16, n), got {x.shape}")
         columns = x.reshape(16, -1)
-        p = np.stack(
-            [
-                np.broadcast_to(np.asarray(s, float), columns.shape[1])
-                for s in (wind, vertical_shear, horizontal_shear)
-            ]
-        )
-        return evaluate(self.kernel_data(pitch), columns, p)[0].reshape(x.shape)
+        angle = np.asarray(pitch, float)
+        data = self.pitched_kernel_data() if angle.ndim else self.kernel_data(float(angle))
+        signals = [wind, vertical_shear, horizontal_shear, *([angle] if angle.ndim else [])]
+        p = np.stack([np.broadcast_to(np.asarray(s, float), columns.shape[1]) for s in signals])
+        return evaluate(data, columns, p)[0].reshape(x.shape)
 
-    def loads(self, state: ArrayLike, wind: ArrayLike, pitch: float = 0.0) -> dict[str, Array]:
-        """Load channels [SI] for states (n, 16) and wind signals (n, 3), the accelerations being those of the equations."""
+    def loads(self, state: ArrayLike, wind: ArrayLike, pitch: ArrayLike = 0.0) -> dict[str, Array]:
+        """Load channels [SI] for states (n, 16) and wind signals (n, 3), the accelerations being those of the equations.
+
+        pitch [rad]: a number, or (n,), the pitch of each state.
+        """
         from fatigue_runner.turbine.lanes import load_channels
 
-        return load_channels(self.kernel_data(pitch), np.asarray(state, float), np.asarray(wind, float))
+        angle, signals = np.asarray(pitch, float), np.asarray(wind, float)
+        if angle.ndim:
+            signals = np.concatenate([signals, angle[:, None]], axis=1)
+        data = self.pitched_kernel_data() if angle.ndim else self.kernel_data(float(angle))
+        return load_channels(data, np.asarray(state, float), signals)
 
     def operating_point(
         self,
@@ -131,6 +162,19 @@ def _kernel_data(turbine: Turbine, pitch: float) -> KernelData:
         constants=kernel.constants(turned),
         tables=turbine.tables.cells(pitch, kernel.TABLES[: kernel.EQUATION_TABLES]),
         load_tables=turbine.tables.cells(pitch, kernel.TABLES),
+        cells=len(turbine.tables.tip_speed_ratio) - 1,
+    )
+
+
+@lru_cache(maxsize=4)
+def _pitched_kernel_data(turbine: Turbine) -> KernelData:
+    from fatigue_runner.turbine.generated import kernel, pitched
+
+    names = kernel.TABLES
+    return KernelData(
+        constants=pitched.constants(turbine.parameters),
+        tables=turbine.tables.pitched_cells(names[: kernel.EQUATION_TABLES])[None],
+        load_tables=turbine.tables.pitched_cells(names)[None],
         cells=len(turbine.tables.tip_speed_ratio) - 1,
     )
 
