@@ -4,5 +4,5 @@ set -e
 cd "$(dirname "$0")/.."
 for recipe in $(grep -l '^family: affine' correctors/*.yaml); do
     echo "$recipe"
-    python -m fatigue_runner train "$recipe"
+    fatigue-runner train "$recipe"
 done

@@ -11,6 +11,7 @@ generator_damping  of an exponential Adams method: added to the linear part's [1
 training      winds, see below; `validation`: other winds, for the figures of the card
 samples       single steps per wind (default 500); half of them `perturbation` (1e-5 of each state's deviation) off the trajectory;
               those of an exponential Adams method lie on it
+fit           `robust` (default: little weight on the few steps that no affine map can follow) or `least-squares`
 ridge         of the fit, relative to unit features (default 1e-12)
 seed          of the samples (default 0)
 guard         norm (`max`, `rms`), kappa (2), quantile (0.999; 1: the largest), rtol (0), substeps (fallback; default as needed)
@@ -28,6 +29,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from fatigue_runner.corrector import exponential_adams, features, fit, samples
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
 Say = Callable[[str], None]
+Array = NDArray[np.float64]
+# the edge mode and the shaft, and their rates: the largest errors of a run; what a robust fit watches
+DRIVE = (5, 7, 13, 14, 15)
 InitialState = Callable[[Any, str, Any], Any]  # `campaign.initial.initial_state`
 
 
@@ -126,9 +131,16 @@ class AffineRecipe(_Part):
     initial: Literal["operating-point", "paper", "paper-spinning"] = "operating-point"
     samples: int = Field(default=500, ge=10, le=100_000)
     perturbation: float = Field(default=1e-5, ge=0, le=1)
+    fit: Literal["robust", "least-squares"] = "robust"
     ridge: float = Field(default=1e-12, gt=0, le=1)
     seed: int = Field(default=0, ge=0)
     guard: GuardRecipe = GuardRecipe()
+
+    def solve(self, rows: Array, defects: Array) -> Array:
+        """(16, k) weights of the fit that the recipe asks for: rows (n, k), defects (n, 16)."""
+        if self.fit == "robust":
+            return fit.robust(rows, defects, self.ridge, DRIVE)
+        return fit.affine(rows, defects, self.ridge)
 
     @field_validator("factors")
     @classmethod
@@ -226,7 +238,7 @@ def train_affine(
     say(f"fitting {len(train.plain)} steps")
     size = recipe.step ** (samples.tableau(recipe.method).order + 1)
     x = train.features(features.STAGE_AWARE, tuple(recipe.factors))
-    weights = fit.affine(x, train.defect, recipe.ridge) / size
+    weights = recipe.solve(x, train.defect) / size
     low, high = float(train.rows[:, 16].min()), float(train.rows[:, 16].max())
     open_guard = Guard(0.0, recipe.guard.norm, 1.0, 1.0, (1.0,) * 16, (0.0,) * 16, 2 if recipe.history else 0)
     corrector = Corrector(

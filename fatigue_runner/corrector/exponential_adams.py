@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 WARM = 3  # steps from true states before the sampled one: its earlier values then lie at predicted states, as in a run
-# the shaft, the edge mode and their rates: largest errors of a run
-DRIVE = (5, 7, 13, 14, 15)
 
 
 @dataclass
@@ -180,13 +178,11 @@ def train(
     )
     say(f"fitting the predictor to {len(winds) * recipe.samples} steps")
     found = sampled(None)
-    learned_ahead = fit.robust(
-        found.ahead_rows, to_fixed(found.exact - found.ahead, _turns(found.azimuth)), recipe.ridge, DRIVE
-    )
+    learned_ahead = recipe.solve(found.ahead_rows, to_fixed(found.exact - found.ahead, _turns(found.azimuth)))
     say("fitting the corrector")
     found = sampled(learned_ahead)
     seen, defect = multiplied(found.rows, factors), found.exact - found.plain
-    learned = fit.robust(seen, to_fixed(defect, _turns(found.azimuth)), recipe.ridge, DRIVE)
+    learned = recipe.solve(seen, to_fixed(defect, _turns(found.azimuth)))
     size = recipe.step ** (method.order + 1)
     g = recipe.guard
     change = from_fixed(seen @ learned.T, _turns(found.azimuth))

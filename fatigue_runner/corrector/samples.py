@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,12 +23,13 @@ Array = NDArray[np.float64]
 
 ACCURATE = "dop853"  # the method of the exact step
 SUBSTEPS = 8  # of it in one step: its local error is below 1e-9 of the defects for the steps of this project
+MOST_PIECES = 64  # of the wind in a step
 GRID = 0.1  # s, times at which steps are sampled where a corrector does not look back
 
 
 @dataclass
 class Samples:
-    """n single steps: rows (n, features) stage-aware, raw (n, 18), plain and exact results (n, 16), wind pieces (n, 4, 3)."""
+    """n single steps: rows (n, features) stage-aware, raw (n, 18), plain and exact results (n, 16), wind pieces (n, m, 4, 3)."""
 
     rows: Array
     raw: Array
@@ -52,12 +54,29 @@ class Samples:
         return np.concatenate([base, *more], axis=1) if more else base
 
 
-def wind_pieces(wind: Any, times: Array, step: float) -> Array:
-    """(n, 4, 3) cubic coefficients in time since each of `times` (n,) [s], exact where the wind is cubic over the step."""
-    u = np.array([0.0, 1 / 3, 2 / 3, 1.0])
-    values = np.stack([wind.at(times + x * step) for x in u])
-    powers = np.linalg.inv(np.vander(u, 4, increasing=True)) / step ** np.arange(4)[:, None]
-    return np.einsum("pk,kns->nps", powers, values)
+def wind_pieces(wind: Any, times: Array, step: float, count: int = 1) -> Array:
+    """(n, count, 4, 3) cubic coefficients in time of `count` equal pieces of the steps that begin at `times` (n,) [s].
+
+    Exact where the wind is cubic over each piece; see `pieces_of`.
+    """
+    u, length = np.array([0.0, 1 / 3, 2 / 3, 1.0]), step / count
+    powers = np.linalg.inv(np.vander(u, 4, increasing=True)) / length ** np.arange(4)[:, None]
+    out = np.empty((len(times), count, 4, 3))
+    for i in range(count):
+        values = np.stack([wind.at(times + (i + x) * length) for x in u])
+        out[:, i] = np.einsum("pk,kns->nps", powers, values)
+    return out
+
+
+def pieces_of(winds: Sequence[Any], step: float, grid: float) -> int:
+    """In how many pieces a step from a multiple of `grid` [s] must be cut so that no wind's knot lies inside one; 1 if in too many."""
+    units = [
+        round(1e6 * value) for value in (step, grid, *(w.cell_key for w in winds if w.cell_key is not None))
+    ]
+    if len(units) == 2:
+        return 1
+    count = units[0] // math.gcd(*units)
+    return count if count <= MOST_PIECES else 1
 
 
 def single_steps(
@@ -70,7 +89,7 @@ def single_steps(
     accurate: str = ACCURATE,
     substeps: int = SUBSTEPS,
 ) -> Samples:
-    """One step of `method`, and one in `substeps` of `accurate`, from each of states (n, 16) under wind pieces (n, 4, 3)."""
+    """One step of `method`, and one in `substeps` of `accurate`, from each of states (n, 16) under wind pieces (n, m, 4, 3)."""
     from fatigue_runner.integrators.correction import FIXED_ROWS, RAW_ROWS
     from fatigue_runner.integrators.defects import step_samples
     from fatigue_runner.integrators.kernel_data import runge_kutta_data, stage_rows
@@ -78,20 +97,21 @@ def single_steps(
 
     n = len(states)
     x = to_groups(np.ascontiguousarray(states.T))
-    cells = to_groups(np.ascontiguousarray(pieces.reshape(n, -1).T)).reshape(len(x), 4, -1)
+    count = pieces.shape[1]
+    cells = to_groups(np.ascontiguousarray(pieces.reshape(n, -1).T)).reshape(len(x), count, 4, -1)
     own, finer = runge_kutta_data(tableau(method)), runge_kutta_data(tableau(accurate))
     stages = len(own[0][3])
-    count = FIXED_ROWS + 8 * stages
-    rows, raw = np.empty((len(x), count * LANES)), np.empty((len(x), RAW_ROWS * LANES))
+    width = FIXED_ROWS + 8 * stages
+    rows, raw = np.empty((len(x), width * LANES)), np.empty((len(x), RAW_ROWS * LANES))
     plain, exact = np.empty_like(x), np.empty_like(x)
     data = turbine.kernel_data(pitch)
     scratch, row, clamped = work_space()
     step_samples(
-        x, cells, own[:2], stage_rows(stages), step, finer[:2], substeps, turbine.parameters["g_ratio"],
+        x, cells, step / count, own[:2], stage_rows(stages), step, finer[:2], substeps, turbine.parameters["g_ratio"],
         (data.tables, data.cells, data.constants, scratch, row), clamped, rows, raw, plain, exact,
     )  # fmt: skip
     return Samples(
-        from_groups(rows, count, n).T.copy(),
+        from_groups(rows, width, n).T.copy(),
         from_groups(raw, RAW_ROWS, n).T.copy(),
         from_groups(plain, 16, n).T.copy(),
         from_groups(exact, 16, n).T.copy(),
@@ -180,6 +200,7 @@ def collect(
     scale = np.std(np.concatenate([run.state for run in runs]), axis=0)
     ratio = turbine.parameters["g_ratio"]
     states, pieces, behind = [], [], []
+    count = pieces_of(winds, step, output_step(step, history))
     for wind, run in zip(winds, runs, strict=True):
         last = int(np.searchsorted(run.time, run.time[-1] - step - 1e-9))
         if last <= history:
@@ -191,7 +212,7 @@ def collect(
         moved = slice(0, None, 2)
         x[moved] += _move(rng, x[moved].shape, scale, perturbation, ratio)
         states.append(x)
-        pieces.append(wind_pieces(wind, run.time[pick], step))
+        pieces.append(wind_pieces(wind, run.time[pick], step, count))
         if history:
             slopes = step * accelerations(turbine, run, pitch)
             looked = np.concatenate([slopes[pick - i] for i in range(1, history + 1)], axis=1)

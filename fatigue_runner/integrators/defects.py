@@ -34,9 +34,23 @@ def integrate(x, method, h, first, steps, wind, model, clamped, k, p, stage, slo
 
 @njit(**FAST)
 def step_samples(
-    x, pieces, method, stage_rows, h, accurate, substeps, ratio, model, clamped, rows, raw, plain, exact
+    x,
+    pieces,
+    piece_duration,
+    method,
+    stage_rows,
+    h,
+    accurate,
+    substeps,
+    ratio,
+    model,
+    clamped,
+    rows,
+    raw,
+    plain,
+    exact,
 ):
-    """One step of `method` from each of the states x (groups, WIDTH) under its own cubic wind piece (groups, 4, WIND).
+    """One step of `method` from each of the states x (groups, WIDTH) under its own cubic wind pieces (groups, m, 4, WIND).
 
     Written: rows (groups, n * LANES) what a stage-aware corrector sees, raw (groups, 18 * LANES) what the paper's sees,
     plain (groups, WIDTH) the method's result, exact (groups, WIDTH) that of `substeps` steps of the method `accurate`.
@@ -45,16 +59,16 @@ def step_samples(
     p, states = np.zeros(WIND), np.zeros((3, WIDTH))
     stage, slope, now = np.zeros(WIDTH), np.zeros(WIDTH), np.zeros(WIDTH)
     start, middle, end = np.zeros(WIND), np.zeros(WIND), np.zeros(WIND)
-    piece = np.zeros((1, 4, WIND))
+    piece = np.zeros(pieces.shape[1:])
     for group in range(x.shape[0]):
-        piece[0] = pieces[group]
-        wind = (1e9, piece, True)
+        piece[:] = pieces[group]
+        wind = (piece_duration, piece, True)
         now[:] = x[group]
         integrate(now, method, h, 0, 1, wind, model, clamped, k, p, stage, slope, states)
         plain[group] = now
-        wind_at(0.0, 1e9, piece, start)
-        wind_at(0.5 * h, 1e9, piece, middle)
-        wind_at(h, 1e9, piece, end)
+        wind_at(0.0, piece_duration, piece, start)
+        wind_at(0.5 * h, piece_duration, piece, middle)
+        wind_at(h, piece_duration, piece, end)
         stage_rows[0] = 0
         features(x[group], k, stage_rows, h, ratio, start, middle, end, rows[group])
         raw_features(x[group], start, raw[group])
