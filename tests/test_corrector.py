@@ -59,7 +59,7 @@ def test_one_enhanced_step_is_the_base_step_plus_what_predict_says(name):
     found = training_samples(corrector.method, corrector.step)
     expected = found.plain + corrector.predict(found)
     for i in range(0, 1600, 173):
-        wind = ConstantWind(*found.pieces[i, 0])
+        wind = ConstantWind(*found.pieces[i, 0, 0])
         one = run(
             corrector,
             method=corrector.method,
@@ -85,8 +85,8 @@ def test_a_corrector_that_looks_back_sees_the_slopes_of_the_steps_before():
     # the first step is the fallback's, in many substeps: accurate
     fine = run(method="rk4", step=0.1 / 32, duration=0.1, wind=wind, x=x)
     assert ran.state[1] == pytest.approx(fine.state[-1], rel=1e-11, abs=1e-11)
-    pieces = np.zeros((1, 4, 3))
-    pieces[0, 0] = 7.4, 0.1, 0.02
+    pieces = np.zeros((1, 1, 4, 3))
+    pieces[0, 0, 0] = 7.4, 0.1, 0.02
     now = samples.single_steps(turbine(), "rk4", 0.1, ran.state[1:2], pieces)
     before = 0.1 * samples.accelerations(turbine(), ran)[0]
     now.rows = np.concatenate([now.rows, before[None]], axis=1)
@@ -225,15 +225,28 @@ class TestSamples:
             method="rk4",
             step=0.001,
             duration=0.02,
-            wind=ConstantWind(*found.pieces[i, 0]),
+            wind=ConstantWind(*found.pieces[i, 0, 0]),
             x=found.state[i : i + 1],
         )
-        plain = run(duration=0.02, wind=ConstantWind(*found.pieces[i, 0]), x=found.state[i : i + 1])
+        plain = run(duration=0.02, wind=ConstantWind(*found.pieces[i, 0, 0]), x=found.state[i : i + 1])
         assert found.defect[i] == pytest.approx(fine.state[-1] - plain.state[-1], rel=1e-5, abs=1e-10)
+
+    def test_a_step_over_a_knot_of_the_wind_is_cut_at_the_knot(self):
+        wind = TurbulentWind(8.0, intensity=0.1, seed=1, duration=10.0)  # a knot every 0.2 s
+        assert samples.pieces_of([wind], 0.3, 0.1) == 3
+        assert samples.pieces_of([wind], 0.125, 0.125) == 5
+        assert samples.pieces_of([ConstantWind(8.0)], 0.3, 0.1) == 1
+        cut = samples.wind_pieces(wind, np.array([2.1]), 0.3, 3)[0]
+        for i, u in ((0, 0.03), (1, 0.07), (2, 0.05)):
+            value = ((cut[i, 3] * u + cut[i, 2]) * u + cut[i, 1]) * u + cut[i, 0]
+            assert value == pytest.approx(wind.at(np.array([2.1 + 0.1 * i + u]))[0], abs=1e-12)
+        whole = samples.wind_pieces(wind, np.array([2.1]), 0.3)[0, 0]
+        off = ((whole[3] * 0.17 + whole[2]) * 0.17 + whole[1]) * 0.17 + whole[0]
+        assert np.abs(off - wind.at(np.array([2.27]))[0]).max() > 1e-6
 
     def test_wind_pieces_are_exact_where_the_wind_is_cubic(self):
         wind = TurbulentWind(8.0, intensity=0.14, seed=1, duration=10.0)
-        piece = samples.wind_pieces(wind, np.array([2.05]), 0.1)[0]
+        piece = samples.wind_pieces(wind, np.array([2.05]), 0.1)[0, 0]
         for u in (0.0, 0.03, 0.1):
             assert np.polyval(piece[::-1], u) == pytest.approx(wind.at(np.array([2.05 + u]))[0], abs=1e-12)
 

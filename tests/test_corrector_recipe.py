@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from fatigue_runner.cli import app
-from fatigue_runner.corrector import recipes
+from fatigue_runner.corrector import fit, recipes
 from fatigue_runner.corrector.affine import parse_affine
 from fatigue_runner.corrector.artefact import load
 from fatigue_runner.errors import InputError
@@ -197,3 +197,13 @@ def test_the_api_simulates_with_a_corrector(made):
     run = fr.simulate("nrel5mw", 7.4, "heun", 0.02, 1.0, corrector=made.path, mode="hybrid")
     assert np.isfinite(run.discrepancy).all()
     assert all(c.method and c.step for c in fr.correctors())
+
+
+def test_a_robust_fit_finds_the_map_that_most_steps_follow_whatever_a_few_do():
+    rng = np.random.Generator(np.random.PCG64(3))
+    rows = rng.standard_normal((2000, 6))
+    truth = rng.standard_normal((16, 6))
+    defects = rows @ truth.T + 1e-3 * rng.standard_normal((2000, 16))
+    defects[:40] += 5.0  # two in a hundred steps cross a corner
+    plain, robust = fit.affine(rows, defects), fit.robust(rows, defects, watched=(0, 3))
+    assert 5 * np.abs(robust - truth).max() < np.abs(plain - truth).max()
