@@ -307,6 +307,7 @@ def test_the_kernel_benchmark_finds_packed_code_faster_than_scalar_code():
     assert all(r["ratio"] > 1.5 for r in found["cases"] if r["cases"] >= 16)
     assert 0.01 < found["share_of_peak"] < 1.0
     assert np.isfinite([s["over_kernel"] for s in found["whole_steps"]]).all()
+    assert 0 < found["varying_pitch"]["median"] < np.inf
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ PROGRAM = """
 import hashlib, json, re
 import numpy as np
 from fatigue_runner.integrators import loops, simulate_block
+from fatigue_runner.integrators.pitch import PitchSeries
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import TurbulentWind
 
@@ -31,10 +32,13 @@ wind = TurbulentWind(8.0, intensity=0.1, seed=1, duration=10.0)
 digest = hashlib.sha256()
 for method in ("heun", "rk4", "tsit5", "abm4"):
     digest.update(simulate_block(turbine, method, 0.01, [wind], start, 5.0, 0.015)[0].state.tobytes())
-functions = {}
-for loop in (loops.runge_kutta, loops.multistep):
+series = PitchSeries([0, 1, 2, 3], [0.0, 0.01, 0.02, 0.02])
+digest.update(simulate_block(turbine, "heun", 0.01, [wind], start, 3.0, pitch=series)[0].state.tobytes())
+
+
+def count(assembly, functions):
     name, ours = "", False
-    for line in (loop.inspect_asm(loop.signatures[0]) or "").splitlines():
+    for line in assembly.splitlines():
         label = re.match(r"^(_ZN\\w+|lane_kernel\\w*):", line)
         if label:
             name = label.group(1)
@@ -44,7 +48,13 @@ for loop in (loops.runge_kutta, loops.multistep):
             arithmetic = re.match(r"\\s*v?(add|sub|mul|div|max|f[n]?m(?:add|sub)\\d+)(pd|sd)\\s", line)
             if arithmetic:
                 counts[arithmetic.group(2) == "pd"] += 1
-print(json.dumps({"bits": digest.hexdigest(), "functions": functions}))
+
+
+functions, pitched = {}, {}
+for loop in (loops.runge_kutta, loops.multistep):
+    count(loop.inspect_asm(loop.signatures[0]) or "", functions)
+count(loops.runge_kutta.inspect_asm(loops.runge_kutta.signatures[1]) or "", pitched)
+print(json.dumps({"bits": digest.hexdigest(), "functions": functions, "pitched": pitched}))
 """
 
 
@@ -68,22 +78,23 @@ def runs(tmp_path_factory):
     return run(cache), run(cache)
 
 
-def arithmetic(runs, part: str) -> tuple[int, int]:
+def arithmetic(runs, part: str, kernel: str = "functions") -> tuple[int, int]:
     """(scalar, packed) arithmetic instructions of the largest compiled function of that name."""
     pattern = rf"(\d|^){part}(B|\d*$)"
-    found = [counts for name, counts in runs[0]["functions"].items() if re.search(pattern, name)]
-    assert found, f"{part} is not among {sorted(runs[0]['functions'])}"
+    found = [counts for name, counts in runs[0][kernel].items() if re.search(pattern, name)]
+    assert found, f"{part} is not among {sorted(runs[0][kernel])}"
     return max(found, key=sum)
 
 
-def test_the_right_hand_side_is_packed_to_the_last_operation(runs):
+@pytest.mark.parametrize("kernel", ["functions", "pitched"])
+def test_the_right_hand_side_is_packed_to_the_last_operation(runs, kernel):
     # about 2,000 for two vectors of 8 doubles; what is left is some arithmetic of constants
-    scalar, vector = arithmetic(runs, "lane_kernel")
+    scalar, vector = arithmetic(runs, "lane_kernel", kernel)
     assert vector > 1500
     assert scalar < 0.02 * vector
 
 
-@pytest.mark.parametrize("part", ["runge_kutta", "multistep", "wind_at", "write_output", "scaled_error"])
+@pytest.mark.parametrize("part", ["runge_kutta", "multistep", "_wind_cells", "write_output", "scaled_error"])
 def test_stage_arithmetic_wind_and_output_are_packed(runs, part):
     _, vector = arithmetic(runs, part)
     assert vector >= 4

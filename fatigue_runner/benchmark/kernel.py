@@ -72,22 +72,29 @@ def _loop(rhs: Callable[..., None]) -> Callable[..., None]:
     return run
 
 
-def _work(run: Callable[..., None], turbine: Any, cases: int, lanes: int) -> Callable[[], float]:
-    """A piece of work that returns nanoseconds per evaluation and case; one group after the other, as in a simulation."""
+def _work(
+    run: Callable[..., None], turbine: Any, cases: int, lanes: int, pitched: bool = False
+) -> Callable[[], float]:
+    """A piece of work that returns nanoseconds per evaluation and case; one group after the other, as in a simulation.
+
+    pitched: every case has a pitch of its own, 0 to 8 degrees.
+    """
     from fatigue_runner.integrators.block import aligned
 
-    data = turbine.kernel_data(0.0)
+    data = turbine.pitched_kernel_data() if pitched else turbine.kernel_data(0.0)
+    tables = data.tables if pitched else aligned(data.tables)
     groups = -(-cases // lanes)
     speeds = np.linspace(5.0, 10.0, 16)
     points = [turbine.operating_point(v) for v in speeds]
     x = np.empty((groups, 16, lanes))
-    wind = np.zeros((groups, 3, lanes))
+    wind = np.zeros((groups, 4 if pitched else 3, lanes))
     for i in range(groups * lanes):
         x[i // lanes, :, i % lanes] = points[i % 16]
         wind[i // lanes, 0, i % lanes] = speeds[i % 16]
+        wind[i // lanes, 3:, i % lanes] = np.radians(i % 16 / 2)
     flat, p = x.reshape(groups, -1), wind.reshape(groups, -1)
     arguments = [
-        (aligned(flat[g]), aligned(p[g]), aligned(np.zeros(16 * lanes)), aligned(data.tables), data.cells, aligned(data.constants),
+        (aligned(flat[g]), aligned(p[g]), aligned(np.zeros(16 * lanes)), tables, data.cells, aligned(data.constants),
          np.zeros(1), np.zeros(1), np.zeros(lanes, np.int64))
         for g in range(min(groups, 16))
     ]  # fmt: skip
@@ -162,13 +169,14 @@ def _step_work(turbine: Any, method: str, step: float = 0.01, duration: float = 
 
 def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     """All figures of `fatigue-runner benchmark kernel` as plain values; times in ns per evaluation and case."""
-    from fatigue_runner.turbine import load_turbine
+    from fatigue_runner.turbine import load_turbine, model
     from fatigue_runner.turbine.generated import kernel
 
     turbine = load_turbine(turbine_name)
     packed, scalar = _loop(kernel.rhs), _loop(scalar_kernel())
     work = {f"packed {n}": _work(packed, turbine, n, kernel.LANES) for n in CASES}
     work |= {f"scalar {n}": _work(scalar, turbine, n, 1) for n in CASES}
+    work["pitched"] = _work(_loop(model.rhs), turbine, CASES[-1], kernel.LANES, pitched=True)
     work |= {f"step {name}": _step_work(turbine, name) for name in STEP_METHODS}
     work["peak"] = peak()
     with machine.pinned():
@@ -200,5 +208,6 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
         "peak_flop_per_ns": rate,
         "share_of_peak": flops / best / rate,
         "cases": rows,
+        "varying_pitch": found["pitched"],
         "whole_steps": steps,
     }

@@ -47,6 +47,11 @@ def kernel(result: dict[str, Any]) -> list[str]:
         "",
         f"{result['operations_per_evaluation']} operations per evaluation; peak of fused multiply-adds {peak:.0f} flop/ns, "
         f"so {result['share_of_peak'] * 100:.0f} % of the vector peak at 256 cases.",
+        *(
+            [f"With a pitch of its own for each of 256 cases: {_ns(result['varying_pitch'])} ns."]
+            if "varying_pitch" in result
+            else []
+        ),
         "",
         "Whole steps of 16 turbulent cases at 10 ms, logged at 50 Hz, per evaluation and case:",
         "",
@@ -127,6 +132,17 @@ def verdicts(result: dict[str, Any]) -> list[str]:
             continue
         head = ["error", "classical", unit, "with corrector", unit, "times cheaper"]
         lines += [f"{words}:", "", *table(head, [_pair(a) for a in answers.answers(result, cost)]), ""]
+        less = answers.answers(result, cost, with_exponential=False)
+        said = [
+            f"{a.target} {a.ratio:.2f} ({a.classical.series})"
+            for a in less
+            if a.ratio is not None and a.classical is not None
+        ]
+        if said:
+            lines += [
+                f"Times cheaper than the best Runge-Kutta or Adams method, without the exponential ones: {', '.join(said)}.",
+                "",
+            ]
     judged = targets(result)
     if judged:
         lines += ["Targets:", "", *[f"- {t}" for t in judged], ""]
