@@ -132,6 +132,15 @@ def test_a_corrector_is_held_against_the_classical_curves_at_its_own_error():
     assert beyond.ratio("wall") is None  # closer than any classical point: no ratio is invented
 
 
+def test_exponential_methods_can_be_left_out_of_the_comparison_and_their_corrected_forms_stay():
+    found = result([
+        point("rk4", 0.1, 40, 1e-3), point("etdrk4", 0.1, 10, 1e-3),
+        point("etdrk4 + affine, enhanced", 0.2, 8, 1e-3, "enhanced"),
+    ])  # fmt: skip
+    ratios = [answers.answers(found, "wall", with_exponential=w)[1].ratio for w in (True, False)]
+    assert ratios == [pytest.approx(10 / 8), pytest.approx(40 / 8)]
+
+
 def learned(step, cost, error, **others):
     return point("rk4 + affine, enhanced", step, cost, error, "enhanced", **others)
 

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from fatigue_runner.benchmark.entries import ADAPTIVE, CLASSICAL, ENHANCED, HYBRID
 from fatigue_runner.benchmark.points import Point
 
@@ -142,9 +144,21 @@ class Answer:
         return {"target": self.target, "cost": self.cost, **both, "ratio": self.ratio}
 
 
-def answers(result: dict[str, Any], cost: str) -> list[Answer]:
-    """One per accuracy. The adaptive methods count by their evaluations; SciPy's time is an interpreter's."""
+def exponential(point: Point) -> bool:
+    """Whether a method integrates the turbine's linear part exactly: one that knows its Jacobian beforehand."""
+    from fatigue_runner.integrators import METHODS, method
+
+    return point.method in METHODS and method(point.method).growth(np.zeros(1, complex)) is None
+
+
+def answers(result: dict[str, Any], cost: str, with_exponential: bool = True) -> list[Answer]:
+    """One per accuracy. The adaptive methods count by their evaluations; SciPy's time is an interpreter's.
+
+    with_exponential: False leaves the exponential methods out of the classical ones.
+    """
     points = [*result["points"], *(result["adaptive"] if cost == "evaluations" else ())]
+    if not with_exponential:
+        points = [p for p in points if p.corrected or not exponential(p)]
     out = []
     for target, error, level in LEVELS:
         found = ranking(points, cost, error, level)
