@@ -68,6 +68,14 @@ def test_a_step_that_diverged_or_is_useless_bends_no_curve():
     assert answers.reach(curve, answers.wall, answers.nrmse, 1e-2).wall == pytest.approx(10e-6)
 
 
+def test_nothing_is_read_across_a_step_that_is_unstable():
+    curve = [point("a", 0.3, 2, 3e-2), point("a", 0.2, 3, 2.0), point("a", 0.1, 10, 1e-3)]
+    found = answers.reach(curve, answers.wall, answers.nrmse, 1e-2)
+    assert found.wall == pytest.approx(10e-6) and found.between == ("a 100 ms",)
+    lost = [curve[0], point("a", 0.2, 3, None, diverged=1), curve[2]]
+    assert answers.reach(lost, answers.wall, answers.nrmse, 1e-2) == found
+
+
 def test_a_point_that_is_dearer_and_worse_than_another_of_its_curve_does_not_count():
     curve = [point("a", 0.1, 10, 1e-3), point("a", 0.09, 12, 2e-3), point("a", 0.05, 20, 1e-4)]
     without = [curve[0], curve[2]]

@@ -1,7 +1,8 @@
 """What the points say: the Pareto front, and the cheapest integrator for an accuracy, classical against corrected.
 
 The cost of an accuracy is read from a method's curve: between the two neighbouring steps whose errors enclose it, by a straight
-line in log cost over log error; where already the largest useful step is closer, that step's cost. Never extrapolated: a curve that
+line in log cost over log error; where already the largest useful step is closer, or a step between the two is unstable, the
+closer step's cost. Never extrapolated: a curve that
 does not reach an accuracy has no cost for it. A corrector's curve runs through the steps it was trained for; one between them takes
 seconds to train.
 """
@@ -95,7 +96,7 @@ def reach(points: Sequence[Point], cost: Cost, error: Error, level: float) -> Re
     if i is None:
         return None
     here = curve[i]
-    if i == 0 or errors[i] <= 0.0:
+    if i == 0 or errors[i] <= 0.0 or _broken(points, error, curve[i - 1], here):
         return Reached(
             here.series, here.kind, wall(here), here.evaluations_per_second, here.step, (here.label,)
         )
@@ -109,6 +110,13 @@ def reach(points: Sequence[Point], cost: Cost, error: Error, level: float) -> Re
     rate, step = between(evaluations), between(lambda p: p.step)
     assert rate is not None and step is not None
     return Reached(here.series, here.kind, between(wall), rate, step, (before.label, here.label))
+
+
+def _broken(points: Sequence[Point], error: Error, before: Point, after: Point) -> bool:
+    """Whether a step between two others diverged or was useless: no step between them can be trusted to lie on the line."""
+    low, high = sorted((before.step, after.step))
+    inside = [p for p in points if low < p.step < high]
+    return any(p.diverged or (e := error(p)) is None or e >= USELESS for p in inside)
 
 
 def ranking(points: Iterable[Point], cost: str, error: Error, level: float) -> list[Reached]:
