@@ -155,6 +155,11 @@ def test_a_wrong_key_inside_a_set_of_cases_is_named_with_its_line(tmp_path):
         load(file)
 
 
+def test_a_pitch_that_varies_in_time_is_refused():
+    with pytest.raises(InputError, match="a benchmark needs one pitch"):
+        load({**SMALL, "pitch": {"time": [0, 4, 8], "angle": [0, 1, 2]}})
+
+
 def test_an_unstable_combination_says_when_it_diverged_and_has_no_errors(result):
     part = result["cases"][0]
     lost = next(p for p in part["points"] if (p.method, p.step) == ("heun", 0.15))

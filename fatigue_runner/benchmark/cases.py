@@ -150,6 +150,10 @@ def _cases(source: Source) -> Cases:
         raise InputError(
             f"{source.where(('reference',))}: a benchmark needs a reference; name one or leave the key out"
         )
+    if not isinstance(spec.pitch, int | float):
+        raise InputError(
+            f"{source.where(('pitch',))}: a benchmark needs one pitch: its exponential methods and its correctors are made for one"
+        )
     turbine = checks.load_turbine(spec, source)
     checks.check_pitch(spec, turbine, source)
     named = wind_cases(spec.wind, spec.duration, turbine, source)
