@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +79,38 @@ def test_the_hybrid_trusts_the_network_where_the_discrepancy_is_within_the_limit
     assert run.accepted.sum() >= 8
 
 
+def test_the_hybrid_takes_the_fallback_where_the_wind_leaves_the_bounds_however_near_the_network_is(turbine):
+    margins = {"guard": {"quantile": 1, "margin": 0.25}}
+    corrector, _ = train_recipe(parse_recipe({**TINY, **margins}), turbine, initial_state)
+    guard = corrector.guard
+    # 6 to 8 m/s and a quarter of that beyond, on both sides
+    assert (guard.low[-1], guard.high[-1]) == (pytest.approx(5.5), pytest.approx(8.5))
+    near = replace(corrector, guard=replace(guard, limit=1e30))
+    winds = [ConstantWind(v) for v in (5.4, 5.6, 8.4, 8.6)]
+    start = np.array([initial_state(turbine, "paper-spinning", ConstantWind(7.0))] * 4)
+    run = simulate_block(turbine, "heun", 0.01, winds, start, 0.1, corrector=near, mode="hybrid")
+    assert [bool(r.accepted[0]) for r in run] == [False, True, True, False]
+    rk3 = simulate_block(turbine, "rk3", 0.01, winds, start, 0.1)
+    for i in (0, 3):
+        assert not run[i].accepted.any() and np.isfinite(run[i].discrepancy).all()
+        np.testing.assert_allclose(run[i].state, rk3[i].state, rtol=1e-12, atol=1e-15)
+
+
+def test_bounds_survive_the_artefact_and_wrong_ones_are_refused(trained, tmp_path):
+    corrector, _ = trained
+    bounds = {"low": (-1.0,) * 17, "high": (1.0,) * 17, "margin": 0.5}
+    artefact.save(
+        replace(corrector, guard=replace(corrector.guard, **bounds)), tmp_path / "bounded.safetensors"
+    )
+    found = artefact.load(tmp_path / "bounded.safetensors").guard
+    assert (found.low, found.high, found.margin) == (bounds["low"], bounds["high"], 0.5)
+    with pytest.raises(InputError, match="bounds 3 features, there are 17"):
+        replace(corrector, guard=replace(corrector.guard, low=(0.0,) * 3, high=(1.0,) * 3))
+    for low, high in (((0.0,), ()), ((2.0,), (1.0,)), ((float("nan"),), (1.0,))):
+        with pytest.raises(InputError, match="low and high"):
+            replace(corrector.guard, low=low, high=high)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -135,6 +168,28 @@ def test_the_papers_networks_are_closer_than_rk3_on_winds_that_they_have_not_see
         return [float(np.mean(((r.state - e.state) / extent) ** 2)) for r, e in zip(runs, exact, strict=True)]
 
     assert all(np.array(errors("heun", corrector=corrector)) < np.array(errors("rk3")))
+
+
+@pytest.mark.parametrize("path", PAPER, ids=lambda p: p.stem)
+def test_the_papers_hybrid_is_nowhere_worse_than_rk3_up_to_20_metres_per_second(path, turbine):
+    corrector = artefact.load(path.with_suffix(".safetensors"))
+    # in range, at the edges of the bounds, where the network errs most (11 to 13 m/s), and far out
+    speeds = (5.0, 7.2, 9.9, 10.05, 10.5, 11.5, 12.4, 13.5, 16.0, 20.0)
+    winds = [ConstantWind(v) for v in speeds]
+    start = np.array([initial_state(turbine, "paper-spinning", w) for w in winds])
+    exact = simulate_block(turbine, "dop853", 0.005, winds, start, 20.0, 0.1)
+
+    def errors(method, **more):
+        runs = simulate_block(turbine, method, corrector.step, winds, start, 20.0, 0.1, **more)
+        extent = [np.maximum(np.ptp(e.state, axis=0), 1e-12) for e in exact]
+        found = [np.mean(((r.state - e.state) / x) ** 2) for r, e, x in zip(runs, exact, extent, strict=True)]
+        return np.array(found), np.array([r.accepted.mean() for r in runs])
+
+    hybrid, accepted = errors("heun", corrector=corrector, mode="hybrid")
+    rk3, _ = errors("rk3")
+    assert (hybrid <= rk3 * (1 + 1e-9)).all()
+    # the share of tenths of a second in which every step was accepted
+    assert (accepted[:4] > 0.4).all() and not accepted[4:].any()
 
 
 def test_train_tunes_first_and_keeps_what_it_found(tmp_path, capsys, monkeypatch):

@@ -35,6 +35,8 @@ class Guard:
 
     limit = kappa * (largest, or the stated quantile, over the training set); atol, rtol (16,). `substeps`: 0 for a method of the
     next order that shares the stages, else the fallback is that many smaller steps of the method itself.
+    low, high: bounds of the features behind the leading 1, without factors; a step whose features leave them is refused, whatever its
+    distance. Empty: no bounds. They are the extent of the training and validation samples, and `margin` times it on both sides.
     """
 
     limit: float
@@ -44,8 +46,15 @@ class Guard:
     atol: tuple[float, ...]
     rtol: tuple[float, ...]
     substeps: int = 0
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
+    margin: float | None = None
 
     def __post_init__(self) -> None:
+        if len(self.low) != len(self.high) or not all(
+            a <= b for a, b in zip(self.low, self.high, strict=True)
+        ):
+            raise CorrectorError("guard: low and high need a number per feature each, low at most at high")
         if self.norm not in NORMS:
             raise CorrectorError(f"guard: norm must be one of {', '.join(NORMS)}, got {self.norm!r}")
         if not all(a > 0 for a in self.atol) or len(self.atol) != 16 or len(self.rtol) != 16:
@@ -127,6 +136,8 @@ class Corrector:
         from fatigue_runner.integrators.exponential_adams import MOST_PAST, PARTS, base_rows
 
         feature_names.multi_blade_factors(self.factors)
+        if self.guard.low:
+            raise CorrectorError(f"corrector {self.name}: one of an exponential method has no bounds")
         if len(self.ahead_atol) != 16 or not all(a > 0 for a in self.ahead_atol):
             raise CorrectorError(
                 f"corrector {self.name}: ahead_atol needs 16 positive numbers, to guard the predictor"
@@ -176,6 +187,10 @@ class Corrector:
         if base * (1 + len(self.factors)) > feature_names.MOST_ROWS:
             raise CorrectorError(
                 f"corrector {self.name}: {base * (1 + len(self.factors))} features are more than {feature_names.MOST_ROWS}"
+            )
+        if self.guard.low and len(self.guard.low) != base - 1:
+            raise CorrectorError(
+                f"corrector {self.name}: its guard bounds {len(self.guard.low)} features, there are {base - 1}"
             )
         if self.linear is None and not self.layers:
             raise CorrectorError(f"corrector {self.name}: it has neither a linear part nor layers")

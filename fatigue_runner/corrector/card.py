@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fatigue_runner.corrector.artefact import Corrector
+from fatigue_runner.corrector.artefact import Corrector, Guard
 
 _LABELS = {
     "nrmse_plain": "plain {method}, median NRMSE over winds",
@@ -39,10 +39,17 @@ def summary(corrector: Corrector) -> list[tuple[str, str]]:
         ("wind speeds seen", f"{corrector.wind_range[0]:.2f} to {corrector.wind_range[1]:.2f} m/s"),
         (
             "guard",
-            f"{guard.norm} norm <= {guard.limit:.4g} (kappa {guard.kappa:g}, quantile {guard.quantile:g}); fallback: {fallback}",
+            f"{guard.norm} norm <= {guard.limit:.4g} (kappa {guard.kappa:g}, quantile {guard.quantile:g}){_bounds(guard)}; "
+            f"fallback: {fallback}",
         ),
         ("licence", corrector.licence),
     ]
+
+
+def _bounds(guard: Guard) -> str:
+    if not guard.low:
+        return ""
+    return f", inputs at most {(guard.margin or 0.0) * 100:g} % outside the extent of the training and validation samples"
 
 
 def validation_rows(corrector: Corrector) -> list[tuple[str, str]]:

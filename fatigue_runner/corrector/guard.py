@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,6 +74,18 @@ def from_training_set(
     other = fallback_results(turbine, corrector.method, corrector.step, substeps, samples)
     difference = samples.plain + corrector.predict(samples) - other
     return limit_of(difference, samples.state, other, norm, kappa, quantile, rtol, substeps)
+
+
+def bounded(guard: Guard, features: Array, margin: float) -> Guard:
+    """The guard with bounds: the extent of features (n, 1 + k), whose leading 1 is left out, and `margin` times it on both sides.
+
+    The distance from the fallback holds the fallback's own error, so a network may be as wrong as that without being told from a good
+    one; far from the samples that is what happens.
+    """
+    low, high = features[:, 1:].min(axis=0), features[:, 1:].max(axis=0)
+    # what stands still in the samples may move by rounding
+    room = margin * (high - low) + 1e-9 * (1 + np.abs(high))
+    return replace(guard, low=tuple((low - room).tolist()), high=tuple((high + room).tolist()), margin=margin)
 
 
 def limit_of(

@@ -46,12 +46,13 @@ class Perturbation(_Part):
 
 
 class GuardRecipe(_Part):
-    """Acceptance test of the hybrid, see `guard.from_training_set`."""
+    """Acceptance test of the hybrid, see `guard.from_training_set`; `margin`: see `guard.bounded`, no bounds where it is not given."""
 
     norm: Literal["max", "rms"] = "rms"
     kappa: float = Field(default=1.0, ge=1)
     quantile: float = Field(default=1.0, gt=0, le=1)
     rtol: float = Field(default=0.0, ge=0)
+    margin: float | None = Field(default=None, ge=0)
 
 
 class MlpRecipe(_Part):
@@ -243,8 +244,8 @@ def guarded(
     made: Mapping[str, Any],
     text: str = "",
 ) -> Corrector:
-    """Corrector of trained layers: threshold from the training set, figures from the validation winds."""
-    from fatigue_runner.corrector.guard import from_training_set
+    """Corrector of trained layers: threshold from the training set, bounds from it and the validation winds, figures from those."""
+    from fatigue_runner.corrector.guard import bounded, from_training_set
     from fatigue_runner.integrators.correcting import SHARING
 
     if recipe.method not in SHARING:
@@ -260,6 +261,9 @@ def guarded(
         wind_range=(min(recipe.speeds.train), max(recipe.speeds.train)), training=dict(made), recipe=text,
     )  # fmt: skip
     guard = from_training_set(corrector, turbine, train, g.norm, g.kappa, g.quantile, g.rtol, 0)
+    if g.margin is not None:
+        seen = [samples.features(corrector.kind) for samples in (train, validation)]
+        guard = bounded(guard, np.concatenate(seen), g.margin)
     corrector = replace(corrector, guard=guard)
     return replace(corrector, validation=_judged(recipe, turbine, initial_state, corrector, validation))
 

@@ -76,6 +76,23 @@ def guard(x, fallback, corrected, units, limit, norm, scaled, accepted, discrepa
         x[m] = good if scaled[m] <= limit else safe
 
 
+@njit(nogil=True, error_model="numpy")
+def refuse_outside(features, low, high, fallback, x, accepted):
+    """x = fallback, not accepted, in lanes where a feature leaves [low, high] (one per feature after the leading 1; nothing: no bounds).
+
+    Compiled without fastmath: NaN lies outside.
+    """
+    for j in range(LANES):
+        inside = True
+        for i in range(len(low)):
+            value = features[(1 + i) * LANES + j]
+            inside = inside and low[i] <= value <= high[i]
+        if not inside:
+            accepted[j] = False
+            for i in range(16):
+                x[i * LANES + j] = fallback[i * LANES + j]
+
+
 @njit(**FAST)
 def fall_back(n, h, now, current, states, k, fallback, substeps, wind, model, clamped, work, out):
     """Result of the fallback from `current`, which is states[now]: more stages on top of the method's own, or smaller steps.
@@ -151,12 +168,12 @@ def corrected_steps(
     """Advance one group by `steps` corrected steps of size h, as `loops.runge_kutta`, and
 
     method = (stage table, result table, rows of the stage slopes); network as `correction.correction`;
-    safety = (hybrid, fallback, `correcting.guard_units`, limit, norm); work = `working_arrays`. A network that looks back at
-    earlier steps begins when it can: until then the fallback steps.
+    safety = (hybrid, fallback, `correcting.guard_units`, limit, norm, bounds of the features (low, high)); work =
+    `working_arrays`. A network that looks back at earlier steps begins when it can: until then the fallback steps.
     status = (accepted, discrepancy, local error) (n - 1, LANES) are written: the worst of each output interval.
     """
     (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), stage_rows = method
-    hybrid, fallback, units, limit, norm = safety
+    hybrid, fallback, units, limit, norm, (low, high) = safety
     cell_duration, wind_cells, changing = wind
     tables, cells, constants, scratch, row = model
     out_step, exact, position, velocity = plan
@@ -200,6 +217,8 @@ def corrected_steps(
             else:
                 add(plain, defect, fixed)
                 guard(current, other, fixed, units, limit, norm, scaled, accepted, discrepancy)
+                if len(low) > 0:
+                    refuse_outside(features, low, high, other, current, accepted)
             # the logged error estimate is the embedded one, not the learned one
             subtract(other, plain, defect)
         else:

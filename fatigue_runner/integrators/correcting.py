@@ -126,7 +126,8 @@ def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: floa
         fallback = (*again[:2], 0, guard.substeps)
         extra = guard.substeps * stages - 1
     units = guard_units(guard.atol, guard.rtol)
-    safety = (mode == "hybrid", fallback, units, float(guard.limit), _norm(guard))
+    bounds = np.array(guard.low), np.array(guard.high)
+    safety = (mode == "hybrid", fallback, units, float(guard.limit), _norm(guard), bounds)
     network = corrector.kernel_network(turbine.parameters["g_ratio"])
     at_start = STARTING * stages - 1
     return Correcting((*data[:2], rows), network, safety, float(guard.limit), extra, extra_at_start=at_start)
