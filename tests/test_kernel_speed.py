@@ -88,10 +88,10 @@ def arithmetic(runs, part: str, kernel: str = "functions") -> tuple[int, int]:
 
 @pytest.mark.parametrize("kernel", ["functions", "pitched"])
 def test_the_right_hand_side_is_packed_to_the_last_operation(runs, kernel):
-    # about 2,000 for two vectors of 8 doubles; what is left is some arithmetic of constants
+    # about 1,000 with 8 doubles a vector; what is left is some arithmetic of constants
     scalar, vector = arithmetic(runs, "lane_kernel", kernel)
-    assert vector > 1500
-    assert scalar < 0.02 * vector
+    assert vector > 800
+    assert scalar < 0.03 * vector
 
 
 @pytest.mark.parametrize("part", ["runge_kutta", "multistep", "_wind_cells", "write_output", "scaled_error"])

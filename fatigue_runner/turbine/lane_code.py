@@ -89,7 +89,11 @@ def _number(node: ast.expr) -> float:
 
 
 class _Emitter:
-    """Writes the code for two vectors of lanes in turns: while one waits for a result, the other one computes."""
+    """Writes the code for one vector of lanes, in a loop over the vectors.
+
+    Two vectors in turns are faster alone (22 instead of 31 ns a lane) and slower in a time step: their 35 kB of instructions fill the
+    first-level cache and push out the rest of the step (measured: 36 instead of 34 ns an evaluation of RK4, everything included).
+    """
 
     def __init__(self, builder: Any, code: Code, data: Mapping[str, Any], written: str, lanes: int) -> None:
         self.builder, self.code, self.data, self.written, self.lanes = builder, code, data, written, lanes
@@ -102,16 +106,11 @@ class _Emitter:
 
     def run(self) -> None:
         statements = ast.parse(self.code.text).body
-        together = 2 if self.lanes % (2 * self.size) == 0 else 1
-        with cgutils.for_range(self.builder, _WORD(self.lanes // (together * self.size))) as loop:
-            first = self.builder.mul(loop.index, _WORD(together * self.size))
-            vectors: list[tuple[Any, dict[str, Any], list[tuple[Any, list[Any]]]]] = [
-                (self.builder.add(first, _WORD(i * self.size)), {}, []) for i in range(together)
-            ]
+        with cgutils.for_range(self.builder, _WORD(self.lanes // self.size)) as loop:
+            self.lane = self.builder.mul(loop.index, _WORD(self.size))
             for statement in statements:
                 assert isinstance(statement, ast.Assign)
-                for self.lane, self.values, self.cells in vectors:
-                    self.assign(statement.targets[0], self.expression(statement.value))
+                self.assign(statement.targets[0], self.expression(statement.value))
 
     def assign(self, target: ast.expr, value: Any) -> None:
         if isinstance(target, ast.Name):
