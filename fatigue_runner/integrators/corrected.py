@@ -170,7 +170,8 @@ def corrected_steps(
     method = (stage table, result table, rows of the stage slopes); network as `correction.correction`;
     safety = (hybrid, fallback, `correcting.guard_units`, limit, norm, bounds of the features (low, high)); work =
     `working_arrays`. A network that looks back at earlier steps begins when it can: until then the fallback steps.
-    status = (accepted, discrepancy, local error) (n - 1, LANES) are written: the worst of each output interval.
+    status = (accepted, discrepancy, local error) (n - 1, LANES) are written: the worst since the last step with outputs, in the
+    row of a step's first output.
     """
     (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), stage_rows = method
     hybrid, fallback, units, limit, norm, (low, high) = safety
@@ -234,15 +235,12 @@ def corrected_steps(
         now, first = new, output
         while output < len(out_step) and out_step[output] <= n + 1:
             write_output(output, exact, position, velocity, h, states, k, now, rows)
-            if output == first:
-                scaled_error(largest, current, error_out, output - 1)
-            for j in range(LANES):
-                error_out[output - 1, j] = error_out[first - 1, j]
-                accepted_out[output - 1, j] = accepted[j]
-                discrepancy_out[output - 1, j] = discrepancy[j]
             output += 1
         if output > first:
+            scaled_error(largest, current, error_out, first - 1)
             for j in range(LANES):
+                accepted_out[first - 1, j] = accepted[j]
+                discrepancy_out[first - 1, j] = discrepancy[j]
                 discrepancy[j] = 0.0
                 accepted[j] = True
         if all_diverged:

@@ -3,7 +3,8 @@
 Arguments of both: h [s], steps; method: see `kernel_data`; wind = (cell duration, cells of `wind_at`, changing); model =
 (tables, cells, constants, scratch, row); plan = (step, exact, position, velocity) of `output.OutputPlan`; work = (states, k, p,
 stage, slope, largest, restart), the initial states (WIDTH,) in states[0]. Written: rows (n, WIDTH); errors (n - 1, LANES) where
-the method has an embedded one, the largest of each interval; `diverged_at` (LANES,), -1 or the time; clamped (LANES,).
+the method has an embedded one, the largest since the last step with outputs, in the row of a step's first output;
+`diverged_at` (LANES,), -1 or the time; clamped (LANES,).
 Both end early when all lanes have diverged.
 """
 
@@ -82,9 +83,6 @@ def runge_kutta(h, steps, method, wind, model, plan, work, rows, errors, diverge
             write_output(output, exact, position, velocity, h, states, k, now, rows)
             if e_count > 0 and output == first:
                 scaled_error(largest, stage, errors, output - 1)
-            elif e_count > 0:
-                for j in range(errors.shape[1]):
-                    errors[output - 1, j] = errors[first - 1, j]
             output += 1
         if all_diverged:
             break

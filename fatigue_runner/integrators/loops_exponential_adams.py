@@ -197,8 +197,9 @@ def exponential_adams(
     """Advance one group; method, network, safety as `exponential_adams.loop_data`, `network` and (hybrid, the guard's
     units for predictor and corrector, limit, norm): both the predictor's and the corrector's learned part are guarded.
 
-    work = `working_arrays`; status = (accepted, discrepancy, local error) (n - 1, LANES), the worst of each output interval; the local
-    error is the distance of the predictor's result from the corrector's. The rest as in `loops`.
+    work = `working_arrays`; status = (accepted, discrepancy, local error) (n - 1, LANES), the worst since the last step with
+    outputs, in the row of a step's first output; the local error is the distance of the predictor's result from the corrector's.
+    The rest as in `loops`.
     """
     low, ratio, past, starting, substeps = method
     ahead_weights, plain_ahead_weights, weights, plain_weights, factors = network
@@ -297,15 +298,12 @@ def exponential_adams(
         now, newest, first = new, line, output
         while output < len(out_step) and out_step[output] <= n + 1:
             write_output(output, exact, position, velocity, h, states, k, now, rows)
-            if output == first:
-                scaled_error(largest, current, error_out, output - 1)
-            for j in range(LANES):
-                error_out[output - 1, j] = error_out[first - 1, j]
-                accepted_out[output - 1, j] = accepted[j]
-                discrepancy_out[output - 1, j] = discrepancy[j]
             output += 1
         if output > first:
+            scaled_error(largest, current, error_out, first - 1)
             for j in range(LANES):
+                accepted_out[first - 1, j] = accepted[j]
+                discrepancy_out[first - 1, j] = discrepancy[j]
                 discrepancy[j] = 0.0
                 accepted[j] = True
         if all_diverged:
