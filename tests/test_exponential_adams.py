@@ -212,7 +212,7 @@ def test_both_matrices_survive_the_file(tmp_path):
     save(good, tmp_path / "x.safetensors")
     again = load(tmp_path / "x.safetensors")
     assert np.array_equal(again.predictor, good.predictor) and np.array_equal(again.linear, good.linear)
-    assert (again.damping, again.ahead_atol, again.past) == (1.5, good.ahead_atol, 3)
+    assert (again.damping, again.ahead_atol, again.past) == (3.0, good.ahead_atol, 3)
 
 
 @pytest.mark.parametrize(
