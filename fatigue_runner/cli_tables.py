@@ -18,12 +18,12 @@ def print_results(results: Results, console: Console) -> None:
     """Which integrator is good enough and what it costs, as a table and in words."""
     from rich.markup import escape
 
-    from fatigue_runner.report.ranking import answer, rank
+    from fatigue_runner.report.ranking import answer, rank, unseen_winds
 
     summaries = rank(results.rows)
     console.print()
     console.print(_table(results, summaries, console))
-    for sentence in answer(summaries):
+    for sentence in [*answer(summaries), *unseen_winds(summaries)]:
         console.print(escape(sentence))
     for row in results.lost[:10]:
         when = (
@@ -223,7 +223,7 @@ def train_with_progress(
     from fatigue_runner.corrector.card import validation_rows
     from fatigue_runner.corrector.recipes import train_file
 
-    with console.status("reading the recipe") as status:
+    with console.status("making the samples") as status:
 
         def epoch(at: dict[str, float]) -> None:
             status.update(
@@ -232,6 +232,9 @@ def train_with_progress(
 
         checkpoint = (out or recipe.parent) / f".{overrides.get('name') or recipe.stem}.checkpoint"
         made = train_file(recipe, out, initial_state, overrides, status.update, epoch, checkpoint)
+    if checkpoint.exists():
+        epochs = made.corrector.training["epochs"]
+        console.print(f"stopped after {epochs} epochs: the best so far is written, the same command goes on")
     for label, value in validation_rows(made.corrector)[:7]:
         console.print(f"{label}: {value}")
     console.print(f"corrector: {made.path}\ncard: {made.card}")

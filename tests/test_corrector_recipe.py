@@ -153,6 +153,8 @@ class TestInACampaign:
         assert hybrid["case_id"].endswith("heun_20ms_hybrid_quick")
         assert hybrid["nrmse_max"] < plain["nrmse_max"] / 10
         assert hybrid["acceptance_rate"] > 0.99
+        assert (hybrid["trained_from"], hybrid["trained_to"]) == load(made.path).wind_range
+        assert plain["trained_from"] is None
 
     @pytest.mark.parametrize(
         ("more", "words"),

@@ -193,6 +193,27 @@ def test_clamped_look_ups_are_a_warning_with_their_winds(tmp_path, rows):
     assert "at hub winds from 9 to 10 m/s" in text
 
 
+def test_winds_outside_a_correctors_training_stand_in_the_verdict_and_before_the_figures(tmp_path, rows):
+    known = {
+        "corrector": "rk4-20ms",
+        "mode": "hybrid",
+        "acceptance_rate": 0.5,
+        "trained_from": 4.2,
+        "trained_to": 8.4,
+    }
+    changed = [
+        {**row, **(known if row["method"] == "rk4" and row["step"] == 0.02 else dict.fromkeys(known, ""))}
+        for row in rows
+    ]
+    folder = write_run(tmp_path / "run", changed)
+    assert "rk4 20 ms + rk4-20ms (hybrid): 2 of 6 winds lie outside the 4.2 to 8.4 m/s" in section_text(
+        "limits", folder
+    )
+    answer = section_text("answer", folder)
+    assert answer.count("1 % *") == 1 and "* Some winds lie outside" in answer
+    assert " *" not in section_text("answer", write_run(tmp_path / "plain", rows))
+
+
 def test_text_of_the_user_cannot_become_markup(tmp_path):
     row = {**case_row(8, "rk4", 0.02), "status": "failed", "error_message": "<b>&"}
     folder = write_run(tmp_path / "run", [row], {**CAMPAIGN, "name": "<script>alert(1)</script>"})

@@ -40,6 +40,32 @@ def test_the_cheapest_method_within_a_level_is_named_with_its_cost_and_its_worst
     assert sentences[1].startswith("Cheapest within 0.1 % DEL error: rk4 10 ms")
 
 
+def corrected(wind, acceptance, trained=(4.2, 11.8)):
+    more = {"corrector": "rk4-100ms", "mode": "hybrid", "acceptance_rate": acceptance}
+    return row("rk4", 0.1, wind=wind, trained_from=trained[0], trained_to=trained[1], **more)
+
+
+def test_winds_that_a_corrector_was_not_trained_on_are_counted_with_the_acceptance_there():
+    rows = [corrected(11.8, 0.9999), corrected(8.0, 0.9999), corrected(12.5, 0.8), corrected(15.0, 0.62)]
+    summaries = ranking.rank([*rows, row(wind=20.0), reference()])
+    assert ranking.unseen_winds(summaries) == [
+        "rk4 100 ms + rk4-100ms (hybrid): 2 of 4 winds lie outside the 4.2 to 11.8 m/s that rk4-100ms was trained on, between 12.5 and "
+        "15 m/s; the hybrid's acceptance rate is 71\u00a0% there, under the others 99.9\u00a0%."
+    ]
+
+
+def test_without_a_guard_or_other_winds_no_acceptance_is_made_up():
+    (sentence,) = ranking.unseen_winds(ranking.rank([corrected(13.0, "")]))
+    assert "1 of 1 winds lie outside" in sentence and "at 13 m/s; no guard tells" in sentence
+    (sentence,) = ranking.unseen_winds(ranking.rank([corrected(13.0, 1.0)]))
+    assert sentence.endswith("the hybrid's acceptance rate is 100\u00a0% there.")
+
+
+def test_a_table_that_does_not_say_what_a_corrector_was_trained_on_counts_nothing():
+    assert ranking.unseen_winds(ranking.rank([corrected(13.0, 0.5, ("", ""))])) == []
+    assert ranking.unseen_winds(ranking.rank([corrected(5.0, 0.5)])) == []
+
+
 def test_the_worst_case_decides_and_not_the_mean():
     rows = [row("heun", 0.01, 100, 1e-5, wind=float(w)) for w in range(5, 15)] + [
         row("heun", 0.01, 100, -0.2, wind=15.0)

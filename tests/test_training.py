@@ -119,6 +119,43 @@ def test_training_leaves_the_callers_random_numbers_alone():
     assert torch.equal(torch.rand(3), expected)
 
 
+@pytest.mark.parametrize("there", [False, True])
+def test_a_cuda_device_is_used_where_there_is_one_and_made_reproducible(there, monkeypatch):
+    import os
+
+    import torch
+
+    from fatigue_runner.corrector.training import _device
+
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: there)
+    monkeypatch.delenv("CUBLAS_WORKSPACE_CONFIG", raising=False)
+    assert _device() == torch.device("cuda" if there else "cpu")
+    assert os.environ.get("CUBLAS_WORKSPACE_CONFIG") == (":4096:8" if there else None)
+
+
+def test_a_training_runs_on_the_device_that_was_chosen(monkeypatch):
+    import torch
+
+    if torch.cuda.is_available():
+        assert train_mlp(TRAIN, VALIDATION, SMALL)[1].device == "cuda"
+        return
+    assert train_mlp(TRAIN, VALIDATION, SMALL)[1].device == "cpu"
+    # with a device that is not there the first tensor meets it: nothing stays on the processor unasked
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setenv("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
+    with pytest.raises((AssertionError, RuntimeError), match=r"CUDA|NVIDIA"):
+        train_mlp(TRAIN, VALIDATION, SMALL)
+
+
+def test_a_checkpoints_folder_is_made_before_the_training_and_not_missed_after_it(tmp_path):
+    path = tmp_path / "new" / "folder" / "training.ckpt"
+    train_mlp(TRAIN, VALIDATION, SMALL, checkpoint=path)
+    assert path.is_file()
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be made a folder"):
+        train_mlp(TRAIN, VALIDATION, SMALL, checkpoint=tmp_path / "file" / "training.ckpt")
+
+
 @pytest.mark.parametrize("scheduler", ["plateau", "cosine", "exponential"])
 def test_a_resumed_training_equals_an_uninterrupted_one(tmp_path, scheduler):
     settings = MlpSettings(**{**vars(SMALL), "scheduler": scheduler, "patience": 1})

@@ -27,7 +27,7 @@ BASE = MlpSettings(hidden=(8,), epochs=50, weight_decay=0.0)
 
 
 def test_the_best_of_the_trials_by_validation_loss_is_taken_and_its_loss_is_that_of_its_settings(tmp_path):
-    tuned = tune(TRAIN, VALIDATION, BASE, trials=4, epochs=3, storage=tmp_path / "study.db")
+    tuned = tune(TRAIN, VALIDATION, BASE, trials=4, epochs=3, storage=tmp_path / "new" / "study.db")
     assert len(tuned.trials) == 4 and not tuned.stopped
     best = min((t for t in tuned.trials if t.state == "complete"), key=lambda t: t.value)
     assert {k: getattr(tuned.settings, k) for k in best.settings} == best.settings

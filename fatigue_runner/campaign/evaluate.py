@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -124,7 +125,7 @@ def empty_row(case: Case, campaign: Campaign) -> dict[str, Any]:
 
 
 def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
-    """The columns that say which wind and which pitch [deg] it was."""
+    """The columns that say which wind and which pitch [deg] it was, and which winds a corrector knows."""
     label = wind.label
     names = ("vertical_shear", "horizontal_shear", "turbulence_intensity", "seed")
     return {
@@ -132,7 +133,16 @@ def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
         "wind_speed": known(label["wind_speed"]),
         "pitch_deg": campaign.pitch if isinstance(campaign.pitch, float) else None,
         **{name: known(label.get(name)) for name in names},
+        **_trained(case.integration.file, case.integration.digest),
     }
+
+
+@lru_cache
+def _trained(file: str, digest: str) -> dict[str, float]:
+    """The mean wind speeds [m/s] that a case's corrector was trained on; digest: that of its file, which may change."""
+    from fatigue_runner.corrector import load
+
+    return dict(zip(("trained_from", "trained_to"), load(file).wind_range, strict=True)) if file else {}
 
 
 def _fatigue(campaign: Campaign) -> list[tuple[str, float, str]]:

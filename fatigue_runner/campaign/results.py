@@ -25,7 +25,7 @@ _CASE = (
     ),
     *("pitch_deg", "method", "step", "corrector", "mode", "is_reference"),
     *("status", "diverged_at", "error_message", "duration", "steps", "evaluations", "evaluations_per_second"),
-    *("wall_time", "clamped_lookups", "acceptance_rate"),
+    *("wall_time", "clamped_lookups", "acceptance_rate", "trained_from", "trained_to"),
     *("nrmse_max", "nrmse_mean", "delta_e", "delta_e_range", "delta_t"),
 )
 _TEXT = {"case_id", "wind_source", "method", "corrector", "mode", "status", "error_message"}

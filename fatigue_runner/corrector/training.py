@@ -6,6 +6,7 @@ import copy
 import hashlib
 import itertools
 import json
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -125,6 +126,8 @@ def train_mlp(
     going on gives the same bits as never having stopped. `progress` gets epoch, epochs, train, validation, best, rate after
     every epoch. On a CUDA device where there is one. Raises InputError for a checkpoint of other samples or settings.
     """
+    if checkpoint is not None:
+        make_folder(checkpoint.parent)
     with _reproducible(settings):
         run = _Run(train, validation, settings)
         if checkpoint is not None and checkpoint.exists():
@@ -154,12 +157,21 @@ def _loop(run: _Run, settings: MlpSettings, progress: Progress | None, checkpoin
         _write(whole, checkpoint)
 
 
+def _device() -> torch.device:
+    """A CUDA device where there is one, the processor elsewhere."""
+    if not torch.cuda.is_available():
+        return torch.device("cpu")
+    # cuBLAS gives the same bits twice only with this, read when it starts
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
+    return torch.device("cuda")
+
+
 class _Run:
     """A training under way: all that a checkpoint holds, and the scaled samples."""
 
     def __init__(self, train: Pairs, validation: Pairs, settings: MlpSettings) -> None:
         self.settings = settings
-        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+        self.device = _device()
         kind = torch.float32 if settings.precision == "float32" else torch.float64
         self.scaling_in, self.scaling_out = Scaling.fitted(train.inputs), Scaling.fitted(train.targets)
         self.samples, self.judged = (
@@ -254,7 +266,7 @@ class _Run:
         self.scheduler.load_state_dict(found["scheduler"])
         self.order.set_state(found["order"].cpu())
         self.best_state, self.history = found["best_state"], History(**found["history"])
-        self.history.stopped = False
+        self.history.stopped, self.history.device = False, str(self.device)
 
 
 def _scheduler(optimizer: torch.optim.Optimizer, settings: MlpSettings) -> Any:
@@ -277,6 +289,16 @@ def fingerprint(train: Pairs, validation: Pairs, settings: MlpSettings) -> str:
     for values in (train.inputs, train.targets, validation.inputs, validation.targets):
         digest.update(np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()
+
+
+def make_folder(path: Path) -> None:
+    """The folder, before the work whose result it takes. Raises InputError where it cannot be made."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be made a folder ({error.strerror}); name another with --out"
+        ) from None
 
 
 def _write(state: dict[str, Any], path: Path) -> None:

@@ -52,12 +52,15 @@ def tune(
     belongs to its samples and base settings: the same file serves several. Called again it goes on where it stopped; Ctrl-C
     keeps what is finished. Raises InputError without Optuna, for a file that is no study, and where no trial has finished.
     """
+    from fatigue_runner.corrector.training import make_folder
+
     try:
         import optuna
     except ImportError:
         raise InputError("tuning needs Optuna; install it with `pip install fatigue-runner[train]`") from None
     if trials < 1 or epochs < 1:
         raise InputError(f"tuning needs at least one trial of one epoch, got {trials} of {epochs}")
+    make_folder(storage.parent)
     study = _study(optuna, train, validation, replace(base, epochs=epochs), storage)
     stopped = False
     while not stopped and _finished(study) < trials:

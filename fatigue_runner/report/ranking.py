@@ -22,6 +22,7 @@ from fatigue_runner.report.cells import (
     text,
     truth,
 )
+from fatigue_runner.report.unseen import Unseen, unseen
 
 # Good enough for engineering (well below the scatter between seeds), and good enough to validate against.
 LEVELS = (0.01, 0.001)
@@ -77,6 +78,7 @@ class MethodSummary:
     worst_del_error: DelError | None
     median_del_error: float | None
     on_front: bool = False
+    unseen: Unseen | None = None
 
     @property
     def key(self) -> tuple[str, float | None, str, str, bool]:
@@ -150,7 +152,13 @@ def _summarise(
         nrmse_worst=None if is_reference else max(nrmse, default=None),
         worst_del_error=max(errors, key=lambda e: e.size, default=None),
         median_del_error=_median_of([e.size for e in errors]),
+        unseen=unseen(rows),
     )
+
+
+def unseen_winds(summaries: Iterable[MethodSummary]) -> list[str]:
+    """A sentence per integrator whose corrector met winds that it was not trained on."""
+    return [s.unseen.sentence(s.label, s.corrector, s.cases) for s in summaries if s.unseen]
 
 
 def wall_times_per_second(rows: Iterable[Row]) -> list[float]:

@@ -29,8 +29,9 @@ def build(run: Run) -> Section:
     winners = [cheapest_within(run.integrators, level) for level in LEVELS]
     rows = [TableRow(_cells(run, s), _mark(s, winners)) for s in run.summaries]
     lead = [Paragraph(_unbroken(sentence), strong=i == 0) for i, sentence in enumerate(sentences)]
+    caption = CAPTION + (UNSEEN if any(s.unseen for s in run.summaries) else "")
     return Section(
-        "Which integrator is good enough, and what does it cost?", [*lead, Table(COLUMNS, rows, CAPTION)]
+        "Which integrator is good enough, and what does it cost?", [*lead, Table(COLUMNS, rows, caption)]
     )
 
 
@@ -41,6 +42,7 @@ CAPTION = (
     "exponents and winds. ● on the Pareto front: nothing else is both cheaper and better. Shaded: the cheapest "
     "at each level."
 )
+UNSEEN = " * Some winds lie outside those that the corrector was trained on, see below."
 
 
 def _cells(run: Run, s: MethodSummary) -> list[str]:
@@ -87,7 +89,8 @@ def _verdict(s: MethodSummary) -> str:
     if s.worst_del_error is None:
         return "not compared"
     within = [level for level in LEVELS if s.worst_del_error.size <= level]
-    return f"within {format_percent(min(within))}" if within else f"not within {format_percent(max(LEVELS))}"
+    said = f"within {format_percent(min(within))}" if within else f"not within {format_percent(max(LEVELS))}"
+    return f"{said} *" if s.unseen else said
 
 
 def _mark(s: MethodSummary, winners: list[MethodSummary | None]) -> str:

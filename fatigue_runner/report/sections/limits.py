@@ -1,9 +1,10 @@
-"""What limits the result: lost cases, clamped table look-ups, missing references. Before the figures."""
+"""What limits the result: lost cases, clamped look-ups, winds that a corrector does not know, missing references. Before the figures."""
 
 from __future__ import annotations
 
 from fatigue_runner.report.blocks import Section, Warnings
 from fatigue_runner.report.cells import Row, format_percent, number, text
+from fatigue_runner.report.ranking import unseen_winds
 from fatigue_runner.report.rundata import Run
 
 ORDER = 20
@@ -13,7 +14,8 @@ SHORT = 600.0  # s; the length of a load case in IEC 61400-1
 
 def build(run: Run) -> Section | None:
     """The warnings of this run; None where there are none."""
-    items = [*_clamped(run), *_lost(run), *_uncompared(run), *_unresolved(run), *_short(run), *_folder(run)]
+    items = [*_clamped(run), *_lost(run), *unseen_winds(run.summaries), *_uncompared(run)]
+    items += [*_unresolved(run), *_short(run), *_folder(run)]
     return Section("What limits this result", [Warnings(items)]) if items else None
 
 
