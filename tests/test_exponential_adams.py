@@ -14,7 +14,7 @@ from fatigue_runner.corrector import find
 from fatigue_runner.corrector.artefact import CorrectorError, load, save
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import exponential_adams as adams
-from fatigue_runner.integrators import method, simulate_block
+from fatigue_runner.integrators import method, simulate_block, stability_limit
 from fatigue_runner.integrators.exponential import linear_part
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import TurbulentWind
@@ -231,3 +231,9 @@ def test_both_matrices_survive_the_file(tmp_path):
 def test_a_damaged_artefact_is_refused_with_what_is_wrong(change, message):
     with pytest.raises((CorrectorError, InputError), match=message):
         replace(shipped(), **change)
+
+
+def test_the_stability_limit_knows_the_steep_region_of_the_torque_law():
+    """At 8 m/s the motion is all linear and any step is stable; where the generator reaches region 2.5 it is not (seen in turbulence)."""
+    assert stability_limit(turbine(), "etdabm3", 8.0) > 0.5
+    assert 0.1 < stability_limit(turbine(), "etdabm3") < 0.15

@@ -71,9 +71,8 @@ def limit(cases: Cases, method: str) -> float:
     from fatigue_runner.integrators import stability_limit
 
     speeds = sorted({round(w.mean_speed, 1) for w in cases.winds})
-    return min(
-        stability_limit(cases.turbine, method, v, cases.pitch) for v in speeds[:: max(1, len(speeds) // 2)]
-    )
+    tried = [*speeds[:: max(1, len(speeds) // 2)], None]
+    return min(stability_limit(cases.turbine, method, v, cases.pitch) for v in tried)
 
 
 def rungs(cases: Cases, settings: Settings, method: str, largest: float) -> tuple[list[float], str]:

@@ -16,7 +16,7 @@ import numpy as np
 from fatigue_runner.benchmark import machine
 
 CASES = (1, 8, 16, 64, 256)
-STEP_METHODS = ("heun", "rk3", "rk4", "tsit5", "dop853", "ab4", "abm4", "etdrk4")
+STEP_METHODS = ("heun", "rk3", "rk4", "tsit5", "dop853", "ab4", "abm4", "etdrk4", "etdabm3")
 LOOKUP_OPERATIONS = 6  # of one cubic: three multiplications and three additions
 
 

@@ -239,9 +239,9 @@ def _run_group(
     group.wall = clock() - begin
     # the loops note a step's figures once, in the row of its first output
     noted = np.searchsorted(plan.step[1:], plan.step[1:])
-    group.errors, group.accepted, group.discrepancy = (
-        values[noted] for values in (group.errors, group.accepted, group.discrepancy)
-    )
+    group.errors = group.errors[noted]
+    group.accepted = group.accepted[noted]
+    group.discrepancy = group.discrepancy[noted]
     group.rows[0] = x
     return group
 

@@ -13,13 +13,16 @@ from fatigue_runner.integrators.methods import method as find_method
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
+TRIED_AT = (8.0, 10.5)  # m/s
 TRIED = 8  # runs
 LARGEST = 1.0  # s; no method of this program is used beyond
 
 
 @lru_cache(maxsize=256)
-def stability_limit(turbine: Turbine, method: str, wind: float = 8.0, pitch: float = 0.0) -> float:
-    """Largest step [s] for which no solution grows, |R(h lambda)| <= 1, in every mode of the turbine linearised at `wind` [m/s].
+def stability_limit(turbine: Turbine, method: str, wind: float | None = None, pitch: float = 0.0) -> float:
+    """Largest step [s] for which no solution grows, |R(h lambda)| <= 1, in every mode of the turbine linearised at `wind` [m/s],
+    8 where none is given; an exponential method, which has that motion exact, is tried out at `wind`, or at 8 and in the steep region
+    2.5 of the torque law.
 
     Linear and at one wind: a run below it may still diverge. 0.0 for a method that is unstable at every step.
     """
@@ -27,7 +30,8 @@ def stability_limit(turbine: Turbine, method: str, wind: float = 8.0, pitch: flo
 
     growth = find_method(method).growth
     if growth(np.zeros(1, complex)) is None:
-        return _tried_limit(turbine, method, wind, pitch)
+        return min(_tried_limit(turbine, method, v, pitch) for v in (TRIED_AT if wind is None else (wind,)))
+    wind = TRIED_AT[0] if wind is None else wind
     values = np.linalg.eigvals(linearised(turbine, wind, pitch))
     # the azimuth's free rotation has eigenvalue 0, which every method keeps
     values = values[np.abs(values) > 1e-3]
