@@ -58,16 +58,18 @@ def _table(results: Results, summaries: Any, console: Console) -> Any:
     channels = list(dict.fromkeys(channel for channel, _, _ in fatigue))
     labels = {channel: BY_NAME[channel].label.removesuffix(" moment") for channel in channels}
     groups = {label.replace("blade ", "blade\u00a0"): [channel] for channel, label in labels.items()}
-    if 66 + 12 * len(groups) > console.width:
+    longest = max((len(summary.label) for summary in summaries), default=0)
+    if 46 + max(20, longest) + 12 * len(groups) > console.width:
         groups = {"DEL error": channels}
     table = Table(
         box=box.SIMPLE_HEAD, title="Integrators, cheapest first; DEL errors in %", title_justify="left"
     )
-    table.add_column("integrator", no_wrap=True, vertical="bottom")
+    # a long name may wrap, a figure must not
+    table.add_column("integrator", vertical="bottom", min_width=min(longest, 24))
     for heading in ("evals per s", "wall ms per s", "NRMSE median", "NRMSE worst"):
-        table.add_column(heading.replace(" ", "\n"), justify="right")
+        table.add_column(heading.replace(" ", "\n"), justify="right", no_wrap=True)
     for heading in groups:
-        table.add_column(heading.replace(" ", "\n"), justify="right")
+        table.add_column(heading.replace(" ", "\n"), justify="right", no_wrap=True)
     table.add_column("DEL\nerror", no_wrap=True)
     for summary in summaries:
         wall_time = summary.wall_time_per_second
