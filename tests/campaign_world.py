@@ -72,6 +72,8 @@ def build_world(monkeypatch: Any) -> World:
         ]
 
     integrators = types.ModuleType("fatigue_runner.integrators")
+    # its modules beside the loops, such as `pitch`, are the real ones
+    integrators.__path__ = [str(Path(fatigue_runner.__file__).parent / "integrators")]
     integrators.METHODS = dict(ORDERS)  # type: ignore[attr-defined]
     integrators.simulate_block = simulate_block  # type: ignore[attr-defined]
     integrators.stability_limit = lambda turbine, method: 0.2  # type: ignore[attr-defined]
