@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fatigue_runner.compiled import FAST, njit
+from fatigue_runner.compiled import LEAN, njit
 from fatigue_runner.integrators.correction import correction
 from fatigue_runner.integrators.loops import RING, stages_of_step
 from fatigue_runner.integrators.stepping import (
@@ -31,7 +31,7 @@ STARTING = 32  # substeps of a step before there is a history; with few, the sta
 MOST_ROWS = 512  # of features with their factors, and of a hidden layer
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def guard(x, fallback, corrected, units, limit, norm, scaled, accepted, discrepancy):
     """x = corrected where its scaled distance from the fallback is within the limit, else the fallback; per lane.
 
@@ -76,7 +76,7 @@ def guard(x, fallback, corrected, units, limit, norm, scaled, accepted, discrepa
         x[m] = good if scaled[m] <= limit else safe
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def refuse_outside(features, low, high, fallback, x, accepted):
     """x = fallback, not accepted, in lanes where a feature leaves [low, high] (one per feature after the leading 1; nothing: no bounds).
 
@@ -93,7 +93,7 @@ def refuse_outside(features, low, high, fallback, x, accepted):
                 x[i * LANES + j] = fallback[i * LANES + j]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def fall_back(n, h, now, current, states, k, fallback, substeps, wind, model, clamped, work, out):
     """Result of the fallback from `current`, which is states[now]: more stages on top of the method's own, or smaller steps.
 
@@ -133,35 +133,35 @@ def fall_back(n, h, now, current, states, k, fallback, substeps, wind, model, cl
             combine(own, 0, k2, b_rows, b_weights, 0, b_count, small, out)
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def add(plain, defect, out):
     """out = plain + defect"""
     for m in range(WIDTH):
         out[m] = plain[m] + defect[m]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def subtract(a, b, out):
     """out = a - b"""
     for m in range(WIDTH):
         out[m] = a[m] - b[m]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def move(source, target):
     """target = source"""
     for m in range(WIDTH):
         target[m] = source[m]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def keep_largest(defect, largest):
     """largest = max(largest, |defect|)"""
     for m in range(WIDTH):
         largest[m] = max(largest[m], abs(defect[m]))
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def corrected_steps(
     h, steps, method, network, safety, wind, model, plan, work, rows, status, diverged_at, clamped
 ):
@@ -182,11 +182,11 @@ def corrected_steps(
         (states, k, restart, current, stage, slope, plain, fixed, other, defect, largest),
         (p, start, middle),
         buffers,
+        (discrepancy, accepted, scaled),
         inner,
     ) = work
     features, hidden = buffers
     accepted_out, discrepancy_out, error_out = status
-    discrepancy, accepted, scaled = np.zeros(LANES), np.ones(LANES, np.bool_), np.zeros(WIDTH)
     now, output, all_diverged, history = 0, 1, False, network[2]
 
     keep(restart, rows, 0)
@@ -256,4 +256,5 @@ def working_arrays(start, slopes, aligned):
     inner = (
         np.zeros((3, WIDTH)), aligned(np.zeros_like(k)), np.zeros(WIND), aligned(np.zeros(WIDTH)), aligned(np.zeros(WIDTH)),
     )  # fmt: skip
-    return (states, k, aligned(start), aligned(start), *wide), winds, buffers, inner
+    judged = (aligned(np.zeros(LANES)), np.ones(LANES, np.bool_), aligned(np.zeros(WIDTH)))
+    return (states, k, aligned(start), aligned(start), *wide), winds, buffers, judged, inner

@@ -13,7 +13,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from fatigue_runner.compiled import FAST, njit
+from fatigue_runner.compiled import FAST, LEAN, njit
 from fatigue_runner.turbine.generated.kernel import LANES
 
 BLOCK = 8  # outputs of a dense layer that are summed up side by side
@@ -23,7 +23,7 @@ VECTOR = 8  # doubles in a vector; LLVM splits it where the machine's are shorte
 FIXED_ROWS = 27
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def features(x, k, stage_rows, h, ratio, start, middle, end, rows):
     """Rows of `corrector.features.names(stages)`: x (16, LANES), the stage slopes k[stage_rows], wind at three times."""
     inverse = 1.0 / ratio
@@ -62,7 +62,7 @@ def features(x, k, stage_rows, h, ratio, start, middle, end, rows):
             rows[first + np.uint64(7 * LANES + j)] = h * slip
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def remember(stages, history, rows):
     """Move the last step's first-stage rows behind the stages, before `features` overwrites them; older ones one place on."""
     first = (FIXED_ROWS + 8 * stages) * LANES
@@ -180,7 +180,7 @@ def times_row(typing_context, rows, first, count, factor):
 _times_row: Any = times_row  # its first argument is supplied by numba
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def multiply(count, factors, rows):
     """Append rows 0..count times row `factors[i]`, for every i."""
     for f in range(len(factors)):
@@ -191,7 +191,7 @@ RAW_ROWS = 18  # 1, the 16 states as they are, the wind speed: what the paper's 
 IDENTITY, RELU, ISRU = 0, 1, 2  # activations
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def raw_features(x, start, rows):
     """Rows of the paper's network: 1, state, hub-height wind speed at the step's start."""
     for j in range(LANES):
@@ -201,7 +201,7 @@ def raw_features(x, start, rows):
         rows[LANES + m] = x[m]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def activate(values, count, kind):
     """Apply an activation to `count` rows and append a row of ones for the next layer's bias."""
     size = count * LANES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fatigue_runner.compiled import FAST, njit
+from fatigue_runner.compiled import FAST, LEAN, njit
 from fatigue_runner.integrators.correction import features, raw_features
 from fatigue_runner.integrators.loops import stages_of_step
 from fatigue_runner.integrators.stepping import WIDTH, WIND, combine, keep, wind_at
@@ -13,7 +13,7 @@ from fatigue_runner.turbine.generated import kernel
 _rhs = kernel.rhs
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def integrate(x, method, h, first, steps, wind, model, clamped, k, p, stage, slope, states):
     """Plain steps `first` to `first + steps` of size h from x (WIDTH,), which is overwritten; k[0] and k[3:] are the last step's slopes."""
     (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count) = method

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.compiled import FAST, njit
+from fatigue_runner.compiled import LEAN, njit
 from fatigue_runner.integrators import correction
 from fatigue_runner.integrators.corrected import guard, subtract
 from fatigue_runner.integrators.correction import multiply
@@ -38,7 +38,7 @@ PART = PARTS * LANES
 SIN60 = math.sqrt(0.75)
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def sine_cosine(x, turned):
     """turned (2, LANES) = sine and cosine of the azimuth in the state x."""
     for j in range(LANES):
@@ -61,7 +61,7 @@ def sine_cosine(x, turned):
         turned[LANES + j] = 1.0 - 2.0 * double * double
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def to_fixed(values, first, turned, rows, to):
     """Rows `to` on = mean, cosine and sine part of the three blades' rows of `values` from `first` on."""
     for j in range(LANES):
@@ -76,7 +76,7 @@ def to_fixed(values, first, turned, rows, to):
         rows[(to + 2) * LANES + j] = sine * along + cosine * across
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def state_rows(x, turned, inverse, rows):
     """Rows 0 to 15: 1, deflections, shaft twist, rates, rate of twist."""
     for j in range(LANES):
@@ -93,7 +93,7 @@ def state_rows(x, turned, inverse, rows):
     to_fixed(x, 10, turned, rows, 10)
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def wind_row(p, rows, to):
     """Wind speed, and the wind that the shears add at the rotor's edge."""
     for j in range(LANES):
@@ -103,7 +103,7 @@ def wind_row(p, rows, to):
         rows[(to + 2) * LANES + j] = v * p[2 * LANES + j]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def part_rows(ring, line, turned, rows, to):
     """Rows `to` on = nonlinear part `line` of the ring, turned; unsigned places: numba's check for negative ones costs the vectors."""
     first = np.uint64(to * LANES)
@@ -121,7 +121,7 @@ def part_rows(ring, line, turned, rows, to):
         rows[first + np.uint64(4 * LANES + j)] = sine * along + cosine * across
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def advanced(x, change, turned, out):
     """out = x + change, the change given in multi-blade coordinates."""
     for m in range(2 * LANES):
@@ -142,7 +142,7 @@ def advanced(x, change, turned, out):
             out[first + 2 * LANES + j] = x[first + 2 * LANES + j] + (mean - 0.5 * along - across)
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def relative(x, inverse, rows):
     """rows (15, LANES): deflections, twist, rates, rate of twist, blade by blade."""
     for m in range(6 * LANES):
@@ -154,7 +154,7 @@ def relative(x, inverse, rows):
         rows[14 * LANES + j] = x[14 * LANES + j] - x[15 * LANES + j] * inverse
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def nonlinear_part(slope, product, inverse, ring, line):
     """ring[line] = the accelerations in `slope` without their linear part `product`; the twist's in place of the generator's."""
     for m in range(7 * LANES):
@@ -164,7 +164,7 @@ def nonlinear_part(slope, product, inverse, ring, line):
         ring[line, 7 * LANES + j] = twist - product[7 * LANES + j]
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def shifted_slope(slope, shift, ratio, k, line):
     """k[line] = accelerations in `slope`, moved by the linear part's `shift`; the output interpolates with them."""
     for m in range(7 * LANES):
@@ -174,14 +174,14 @@ def shifted_slope(slope, shift, ratio, k, line):
         k[line, 15 * LANES + j] = slope[15 * LANES + j] + change
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def keep_largest_distance(a, b, largest):
     """largest = max(largest, |a - b|)"""
     for m in range(WIDTH):
         largest[m] = max(largest[m], abs(a[m] - b[m]))
 
 
-@njit(nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy", _nrt=False)
 def forget_infinite(ring):
     """Nonlinear parts of a lane that has diverged must not reach it again after its restart: a strict function, NaN counts."""
     for line in range(ring.shape[0]):
@@ -190,7 +190,7 @@ def forget_infinite(ring):
                 ring[line, m] = 0.0
 
 
-@njit(**FAST)
+@njit(**LEAN)
 def exponential_adams(
     h, steps, method, network, safety, wind, model, plan, work, rows, status, diverged_at, clamped
 ):
@@ -211,11 +211,11 @@ def exponential_adams(
         (states, k, restart, current, slope, ahead, fixed, other, change, largest),
         (p, start, middle),
         (seen, ring, turned, rel, product),
+        (discrepancy, accepted, scaled),
         inner,
     ) = work
     inner_k, inner_p, inner_stage, inner_slope, inner_states = inner
     accepted_out, discrepancy_out, error_out = status
-    discrepancy, accepted, scaled = np.zeros(LANES), np.ones(LANES, np.bool_), np.zeros(WIDTH)
     inverse = 1.0 / ratio
     new_row = PAST_ROW + PARTS * past
     count = new_row + PARTS
@@ -323,4 +323,5 @@ def working_arrays(start, past, inputs, aligned):
         aligned(np.zeros((6, WIDTH))), aligned(np.zeros(WIND)), aligned(np.zeros(WIDTH)), aligned(np.zeros(WIDTH)),
         aligned(np.zeros((3, WIDTH))),
     )  # fmt: skip
-    return (states, k, aligned(start), aligned(start), *wide), winds, buffers, inner
+    judged = (aligned(np.zeros(LANES)), np.ones(LANES, np.bool_), aligned(np.zeros(WIDTH)))
+    return (states, k, aligned(start), aligned(start), *wide), winds, buffers, judged, inner
