@@ -71,7 +71,7 @@ def test_the_same_recipe_gives_the_same_bits_and_another_seed_others(made, tmp_p
         (lambda t: t.replace("vertical_shear", "vertikal_shear"), "unknown key 'training.vertikal_shear'; did you mean 'vertical_shear'"),
         (lambda t: t + "factors: [wind_sped@start]\n", "unknown feature factor 'wind_sped@start'; did you mean 'wind_speed@start'"),
         (lambda t: t.replace("family: affine", "family: afine"), "unknown family 'afine'; did you mean 'affine'"),
-        (lambda t: t.replace("family: affine\n", ""), "key 'family' is missing; known: affine, mlp"),
+        (lambda t: t.replace("family: affine\n", ""), "key 'family' is missing; known: affine, affine+net, mlp"),
         (lambda t: t.replace("method: heun", "method: hein"), "unknown integrator 'hein'; did you mean 'heun'"),
         (lambda t: t.replace("method: heun", "method: ab4"), "correctors exist for Runge-Kutta and exponential Adams methods"),
         (lambda t: t.replace("step: 0.02", "step: -1"), "step: Input should be greater than 0"),

@@ -1,7 +1,8 @@
 """Recipes of the closed-form families: winds, samples and a least-squares fit as data, from a YAML file to the artefact.
 
 name          of the artefact: `NAME.safetensors` beside the recipe
-family        `affine`: the defect is an affine map of the features (`features`); with `factors` one that varies with them
+family        `affine`: the defect is an affine map of the features (`features`); with `factors` one that varies with them;
+              `affine+net`: and a small network on what the map leaves
 turbine       `nrel5mw` (default), `t2b1i1cg` or the path of a turbine YAML
 method, step  the Runge-Kutta or exponential Adams method and its step [s]
 factors       of `sin_azimuth`, `cos_azimuth`, `wind_speed@start`, `rotor_speed`; default none
@@ -14,6 +15,8 @@ samples       single steps per wind (default 500); half of them `perturbation` (
 fit           `robust` (default: little weight on the few steps that no affine map can follow) or `least-squares`
 ridge         of the fit, relative to unit features (default 1e-12)
 seed          of the samples (default 0)
+network       of `affine+net`: its sizes and training, see `affine_net`
+refine        of a Runge-Kutta method's map: fit again on the states that rollouts visit, see `rollouts`; default not
 guard         norm (`max`, `rms`), kappa (2), quantile (0.999; 1: the largest), rtol (0), substeps (fallback; default as needed)
 
 Winds: `type: constant` with `speeds`, `vertical_shear`, `horizontal_shear` (lists, every combination), or `type: turbulent` with
@@ -32,9 +35,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from fatigue_runner.corrector import exponential_adams, features, fit, samples
+from fatigue_runner.corrector import affine_net, exponential_adams, features, fit, rollouts, samples
+from fatigue_runner.corrector.affine_net import NetworkRecipe
 from fatigue_runner.corrector.artefact import Corrector, Guard
 from fatigue_runner.corrector.guard import from_training_set
+from fatigue_runner.corrector.rollouts import RefineRecipe
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.integrators.exponential_adams import ExponentialAdams
 
@@ -118,7 +123,7 @@ class AffineRecipe(_Part):
     """A whole recipe; see the module."""
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
-    family: Literal["affine"]
+    family: Literal["affine", "affine+net"]
     description: str = ""
     turbine: str = "nrel5mw"
     method: str
@@ -135,6 +140,8 @@ class AffineRecipe(_Part):
     ridge: float = Field(default=1e-12, gt=0, le=1)
     seed: int = Field(default=0, ge=0)
     guard: GuardRecipe = GuardRecipe()
+    network: NetworkRecipe | None = None
+    refine: RefineRecipe | None = None
 
     def solve(self, rows: Array, defects: Array) -> Array:
         """(16, k) weights of the fit that the recipe asks for: rows (n, k), defects (n, 16)."""
@@ -171,8 +178,13 @@ class AffineRecipe(_Part):
                 raise ValueError(
                     f"guard.substeps: the fallback of {self.method} is the method itself; leave it out"
                 )
+            for key in ("network", "refine"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f"{key}: correctors of {self.method} are two matrices; leave it out")
         elif self.generator_damping:
             raise ValueError(f"generator_damping: {self.method} has no linear part; leave it out")
+        if (self.network is not None) != (self.family == "affine+net"):
+            raise ValueError("network: the key belongs to family affine+net, and only to it")
         return self
 
     @model_validator(mode="after")
@@ -193,7 +205,9 @@ def parse_affine(data: Mapping[str, Any], place: str = "recipe") -> AffineRecipe
         location = [str(part) for part in first["loc"] if part not in ("Range", "list[float]")]
         key = ".".join(location)
         if first["type"] == "extra_forbidden":
-            inner = {"training": Winds, "validation": Winds, "guard": GuardRecipe}
+            inner = {
+                "training": Winds, "validation": Winds, "guard": GuardRecipe, "network": NetworkRecipe, "refine": RefineRecipe,
+            }  # fmt: skip
             part: Any = inner.get(location[0], AffineRecipe) if len(location) > 1 else AffineRecipe
             known = Range.model_fields if "speeds" in location[:-1] else part.model_fields
             raise InputError(f"{place}: unknown key {key!r}{did_you_mean(location[-1], known)}") from None
@@ -215,8 +229,10 @@ def train_affine(
     initial_state: InitialState | None = None,
     say: Say = lambda what: None,
     text: str = "",
+    progress: affine_net.Progress | None = None,
 ) -> Corrector:
-    """The guarded corrector that a recipe makes; say: told of each stage; text: the recipe's file, kept in the artefact."""
+    """The guarded corrector that a recipe makes; say: told of each stage; text: the recipe's file, kept in the artefact; progress: told
+    of a network's epochs."""
     begin = time.perf_counter()
     if isinstance(samples.base_method(recipe.method), ExponentialAdams):
         made_here = exponential_adams.train(
@@ -236,29 +252,75 @@ def train_affine(
         initial=starts(turbine, winds, recipe.initial, initial_state), **common,
     )  # fmt: skip
     say(f"fitting {len(train.plain)} steps")
-    size = recipe.step ** (samples.tableau(recipe.method).order + 1)
-    x = train.features(features.STAGE_AWARE, tuple(recipe.factors))
-    weights = recipe.solve(x, train.defect) / size
     low, high = float(train.rows[:, 16].min()), float(train.rows[:, 16].max())
-    open_guard = Guard(0.0, recipe.guard.norm, 1.0, 1.0, (1.0,) * 16, (0.0,) * 16, 2 if recipe.history else 0)
-    corrector = Corrector(
-        name=recipe.name, family=recipe.family, method=recipe.method, step=recipe.step, turbine=turbine.name,
-        turbine_hash=turbine.hash, kind=features.STAGE_AWARE, factors=tuple(recipe.factors), linear=weights, layers=(),
-        activation="identity", guard=open_guard, wind_range=(low, high), recipe=text, history=recipe.history,
-    )  # fmt: skip
+
+    def fitted(found: samples.Samples) -> Corrector:
+        return _unguarded(recipe, turbine, found, (low, high), text)
+
+    corrector = fitted(train)
+    made: dict[str, Any] = {"winds": len(winds), "seed": recipe.seed}
+    if recipe.refine is not None:
+        ground = rollouts.Ground(
+            winds, starts(turbine, winds, recipe.initial, initial_state), recipe.samples, recipe.seed
+        )
+        long = recipe.refine.duration or recipe.training.duration
+        corrector, train, more = rollouts.refine(
+            corrector, train, recipe.refine.rounds, fitted, lambda c, number: rollouts.visited(turbine, c, ground, long, number),
+            _judge(recipe, turbine, initial_state), say,
+        )  # fmt: skip
+        made |= more
+    if recipe.network is not None:
+        say("the network's validation steps")
+        unseen = recipe.validation.build()
+        judged_by = samples.collect(
+            turbine, recipe.method, recipe.step, unseen, recipe.validation.duration, recipe.samples, seed=recipe.seed + 1,
+            initial=starts(turbine, unseen, recipe.initial, initial_state), **common,
+        )  # fmt: skip
+        corrector, more = affine_net.add(corrector, train, judged_by, recipe.network, DRIVE, progress)
+        made |= more
     g = recipe.guard
     say("acceptance threshold")
     guard = from_training_set(corrector, turbine, train, g.norm, g.kappa, g.quantile, g.rtol, g.substeps)
     corrector = replace(corrector, guard=guard)
     say("validation")
     judged = validate(corrector, recipe, turbine, initial_state)
-    made = {
-        "samples": len(train.plain),
-        "winds": len(winds),
-        "seed": recipe.seed,
-        "seconds": round(time.perf_counter() - begin, 1),
-    }
+    made = {"samples": len(train.plain), **made, "seconds": round(time.perf_counter() - begin, 1)}
     return replace(corrector, validation=judged, training=made)
+
+
+def _unguarded(
+    recipe: AffineRecipe, turbine: Turbine, found: samples.Samples, winds: tuple[float, float], text: str
+) -> Corrector:
+    """The affine map that fits samples; winds: slowest and fastest [m/s]."""
+    size = recipe.step ** (samples.tableau(recipe.method).order + 1)
+    weights = recipe.solve(found.features(features.STAGE_AWARE, tuple(recipe.factors)), found.defect) / size
+    open_guard = Guard(0.0, recipe.guard.norm, 1.0, 1.0, (1.0,) * 16, (0.0,) * 16, 2)
+    return Corrector(
+        name=recipe.name, family=recipe.family, method=recipe.method, step=recipe.step, turbine=turbine.name,
+        turbine_hash=turbine.hash, kind=features.STAGE_AWARE, factors=tuple(recipe.factors), linear=weights, layers=(),
+        activation="identity", guard=open_guard, wind_range=winds, recipe=text, history=recipe.history,
+    )  # fmt: skip
+
+
+def _judge(
+    recipe: AffineRecipe, turbine: Turbine, initial_state: InitialState | None
+) -> Callable[[Corrector], float]:
+    """Median error of enhanced runs under the validation winds."""
+    winds = recipe.validation.build()
+    start = starts(turbine, winds, recipe.initial, initial_state)
+    duration = recipe.validation.duration - 2 * recipe.step
+    runs = samples.references(turbine, winds, start, duration, samples.output_step(recipe.step, 1))
+
+    def error(corrector: Corrector) -> float:
+        return float(
+            np.median(
+                rollout_errors(
+                    turbine, corrector, "enhanced", winds, start, duration, runs, rollouts.DISCARD
+                )[0]
+            )
+        )
+
+    return error
 
 
 def validate(
@@ -299,8 +361,12 @@ def rollout_errors(
     start: Any,
     duration: float,
     runs: Any,
+    discard: float = 0.0,
 ) -> tuple[Any, float]:
-    """(winds,) NRMSE, the largest over states, infinite where a run diverged; and the share of accepted steps. mode None: plain."""
+    """(winds,) NRMSE, the largest over states, infinite where a run diverged; and the share of accepted steps. mode None: plain.
+
+    discard [s]: what is left out at the start, at most half of the run.
+    """
     from fatigue_runner.integrators import simulate_block
 
     output = float(runs[0].time[1] - runs[0].time[0])
@@ -315,8 +381,9 @@ def rollout_errors(
         for i, run in zip(chosen, block, strict=True):
             accepted.append(float(run.accepted.mean()) if len(run.accepted) else 1.0)
             if run.diverged_at is None:
-                reference = runs[i].state[: len(run.state)]
+                first = int(np.searchsorted(run.time, min(discard, 0.5 * duration) - 1e-9))
+                reference, state = runs[i].state[first : len(run.state)], run.state[first:]
                 scale = np.ptp(reference, axis=0)
                 scale[scale == 0] = 1.0
-                out[i] = float((np.sqrt(((run.state - reference) ** 2).mean(axis=0)) / scale).max())
+                out[i] = float((np.sqrt(((state - reference) ** 2).mean(axis=0)) / scale).max())
     return out, float(np.mean(accepted))

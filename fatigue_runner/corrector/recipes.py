@@ -10,7 +10,7 @@ from typing import Any
 from fatigue_runner.corrector.artefact import Corrector, save
 from fatigue_runner.errors import InputError, did_you_mean
 
-FAMILIES = ("affine", "mlp")
+FAMILIES = ("affine", "affine+net", "mlp")
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def train_file(
         from fatigue_runner.corrector.affine import parse_affine, train_affine
 
         affine = parse_affine(data, str(path))
-        corrector = train_affine(affine, load_turbine(affine.turbine), initial_state, say, text)
+        corrector = train_affine(affine, load_turbine(affine.turbine), initial_state, say, text, progress)
     folder = out or path.parent
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / f"{corrector.name}.safetensors"
