@@ -58,7 +58,7 @@ def test_the_shipped_campaign_has_turbulent_and_constant_winds_of_reserved_seeds
 def test_no_training_wind_has_a_seed_of_the_benchmarks():
     import ruamel.yaml
 
-    from fatigue_runner.corrector.affine import parse_affine
+    from fatigue_runner.corrector.affine_recipe import parse_affine
 
     yaml = ruamel.yaml.YAML(typ="safe")
     found = 0

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from fatigue_runner.cli import app
 from fatigue_runner.corrector import affine_net, recipes, rollouts, samples
-from fatigue_runner.corrector.affine import DRIVE
+from fatigue_runner.corrector.affine_recipe import DRIVE
 from fatigue_runner.corrector.artefact import load
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import simulate_block

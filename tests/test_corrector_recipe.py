@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from fatigue_runner.cli import app
 from fatigue_runner.corrector import fit, recipes
-from fatigue_runner.corrector.affine import parse_affine
+from fatigue_runner.corrector.affine_recipe import parse_affine
 from fatigue_runner.corrector.artefact import load
 from fatigue_runner.errors import InputError
 

@@ -22,7 +22,7 @@ from fatigue_runner.corrector.guard import limit_of
 from fatigue_runner.integrators import exponential_adams as adams
 
 if TYPE_CHECKING:
-    from fatigue_runner.corrector.affine import AffineRecipe
+    from fatigue_runner.corrector.affine_recipe import AffineRecipe
     from fatigue_runner.turbine import Turbine
 
 Array = NDArray[np.float64]

@@ -74,7 +74,8 @@ def train_file(
         mlp = parse_recipe(data, str(path))
         corrector, _ = train_recipe(mlp, load_turbine(mlp.turbine), initial_state, progress, checkpoint, text)
     else:
-        from fatigue_runner.corrector.affine import parse_affine, train_affine
+        from fatigue_runner.corrector.affine import train_affine
+        from fatigue_runner.corrector.affine_recipe import parse_affine
 
         affine = parse_affine(data, str(path))
         corrector = train_affine(affine, load_turbine(affine.turbine), initial_state, say, text, progress)
