@@ -204,6 +204,18 @@ def test_a_guarded_step_ends_within_the_limit_of_its_fallback_or_on_it():
         assert np.array_equal(run.accepted, run.discrepancy <= good.guard.limit)
 
 
+def test_evaluations_count_the_longer_start_of_a_corrector_that_looks_back_further():
+    def count(steps, corrector=None):
+        x = start(off=False)[None]
+        return simulate_block(turbine(), "etdabm3", 0.1, [wind()], x, 0.1 * steps, corrector=corrector)[
+            0
+        ].evaluations
+
+    # RK4 in eight sub-steps until there are two, with the corrector three, values
+    assert [count(n) for n in (1, 2, 5)] == [1 + 32 + 1, 1 + 32 + 2, 1 + 32 + 5]
+    assert [count(n, shipped()) for n in (1, 2, 5)] == [1 + 32 + 1, 1 + 64 + 2, 1 + 64 + 5]
+
+
 # --- the artefact -------------------------------------------------------------------------------------------------
 
 

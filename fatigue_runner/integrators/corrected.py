@@ -18,7 +18,7 @@ from fatigue_runner.integrators.stepping import (
     combine,
     keep,
     mark_diverged,
-    scaled_error,
+    note_step,
     wind_at,
     write_output,
 )
@@ -186,7 +186,6 @@ def corrected_steps(
         inner,
     ) = work
     features, hidden = buffers
-    accepted_out, discrepancy_out, error_out = status
     now, output, all_diverged, history = 0, 1, False, network[2]
 
     keep(restart, rows, 0)
@@ -237,12 +236,7 @@ def corrected_steps(
             write_output(output, exact, position, velocity, h, states, k, now, rows)
             output += 1
         if output > first:
-            scaled_error(largest, current, error_out, first - 1)
-            for j in range(LANES):
-                accepted_out[first - 1, j] = accepted[j]
-                discrepancy_out[first - 1, j] = discrepancy[j]
-                discrepancy[j] = 0.0
-                accepted[j] = True
+            note_step((discrepancy, accepted), largest, current, status, first - 1)
         if all_diverged:
             break
 

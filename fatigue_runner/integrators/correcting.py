@@ -30,7 +30,11 @@ class Correcting:
     limit: float
     extra_per_step: int  # evaluations of the fallback, beyond those it shares
     past: int = 0  # earlier nonlinear parts that an exponential Adams method sees; 0: a Runge-Kutta method
-    extra_at_start: int = 0  # evaluations in the first steps, beyond the plain method's
+    starting: tuple[int, int] = (
+        0,
+        0,
+    )  # first and end of the steps that a corrector which looks back starts with
+    extra_at_start: int = 0  # evaluations in each of them, beyond the plain method's
 
     @property
     def hybrid(self) -> bool:
@@ -49,10 +53,9 @@ class Correcting:
 
     def extra_evaluations(self, steps: int) -> int:
         """Evaluations beyond the plain method's in a run of `steps` steps."""
-        history = 0 if self.past else self.network[2]
-        start = min(steps, history)
-        at_start = self.extra_at_start if self.past else start * self.extra_at_start
-        return at_start + (self.extra_per_step * (steps - start) if self.hybrid else 0)
+        first, end = self.starting
+        start = min(max(steps, first), end) - first
+        return start * self.extra_at_start + (self.extra_per_step * (steps - start) if self.hybrid else 0)
 
 
 def prepare_exponential(
@@ -76,10 +79,9 @@ def prepare_exponential(
     guard = corrector.guard
     units = guard_units(corrector.ahead_atol, guard.rtol), guard_units(guard.atol, guard.rtol)
     safety = (mode == "hybrid", *units, float(guard.limit), _norm(guard))
-    more = method.evaluations(1000, past) - method.evaluations(1000)
     return Correcting(
         adams.loop_data(turbine, pitch, past, corrector.damping), adams.network((ahead + learned_ahead, ahead), (whole, plain), factors),
-        safety, float(guard.limit), 0, past, more,
+        safety, float(guard.limit), 0, past, (method.past - 1, past - 1), 4 * adams.STARTING,
     )  # fmt: skip
 
 
@@ -129,5 +131,7 @@ def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: floa
     bounds = np.array(guard.low), np.array(guard.high)
     safety = (mode == "hybrid", fallback, units, float(guard.limit), _norm(guard), bounds)
     network = corrector.kernel_network(turbine.parameters["g_ratio"])
-    at_start = STARTING * stages - 1
-    return Correcting((*data[:2], rows), network, safety, float(guard.limit), extra, extra_at_start=at_start)
+    return Correcting(
+        (*data[:2], rows), network, safety, float(guard.limit), extra,
+        starting=(0, corrector.history), extra_at_start=STARTING * stages - 1,
+    )  # fmt: skip

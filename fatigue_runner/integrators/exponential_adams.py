@@ -45,10 +45,9 @@ class ExponentialAdams:
     past: int
     evaluations_per_step: int = 1
 
-    def evaluations(self, steps: int, past: int | None = None) -> int:
-        """Of a run of `steps` steps, with the initial slope and the start; past: of a learned correction that sees more."""
-        start = min(steps, (past or self.past) - 1)
-        return 1 + start * 4 * STARTING + steps
+    def evaluations(self, steps: int) -> int:
+        """Of a run of `steps` steps, with the initial slope and the start."""
+        return 1 + min(steps, self.past - 1) * 4 * STARTING + steps
 
     def growth(self, z: NDArray[np.complex128]) -> Array | None:
         """None: what is linear is exact, so that the rest decides; `stability_limit` tries it out."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from fatigue_runner.compiled import LEAN, njit
 from fatigue_runner.integrators import correction
-from fatigue_runner.integrators.corrected import guard, subtract
+from fatigue_runner.integrators.corrected import guard, move, subtract
 from fatigue_runner.integrators.correction import multiply
 from fatigue_runner.integrators.defects import integrate
 from fatigue_runner.integrators.exponential_adams import PARTS, PAST_ROW, STATE_ROW, WIND_ROW
@@ -24,7 +24,7 @@ from fatigue_runner.integrators.stepping import (
     all_fine,
     keep,
     mark_diverged,
-    scaled_error,
+    note_step,
     wind_at,
     write_output,
 )
@@ -215,7 +215,6 @@ def exponential_adams(
         inner,
     ) = work
     inner_k, inner_p, inner_stage, inner_slope, inner_states = inner
-    accepted_out, discrepancy_out, error_out = status
     inverse = 1.0 / ratio
     new_row = PAST_ROW + PARTS * past
     count = new_row + PARTS
@@ -238,16 +237,11 @@ def exponential_adams(
             wind_at((n + 0.5) * h, cell_duration, wind_cells, middle)
             wind_at((n + 1) * h, cell_duration, wind_cells, p)
         if n < past - 1:
-            for m in range(WIDTH):
-                ahead[m] = current[m]
-                fixed[m] = current[m]
             integrate(
-                fixed, starting, h / substeps, n * substeps, substeps, wind, model, clamped,
+                current, starting, h / substeps, n * substeps, substeps, wind, model, clamped,
                 inner_k, inner_p, inner_stage, inner_slope, inner_states,
             )  # fmt: skip
-            for m in range(WIDTH):
-                current[m] = fixed[m]
-                ahead[m] = fixed[m]
+            move(current, ahead)
         else:
             sine_cosine(current, turned)
             state_rows(current, turned, inverse, seen)
@@ -280,8 +274,7 @@ def exponential_adams(
                 advanced(current, change, turned, other)
                 guard(current, other, fixed, units, limit, norm, scaled, accepted, discrepancy)
             else:
-                for m in range(WIDTH):
-                    current[m] = fixed[m]
+                move(fixed, current)
             keep_largest_distance(current, ahead, largest)
         if not all_fine(current):
             all_diverged = mark_diverged(current, (n + 1) * h, diverged_at, restart)
@@ -300,12 +293,7 @@ def exponential_adams(
             write_output(output, exact, position, velocity, h, states, k, now, rows)
             output += 1
         if output > first:
-            scaled_error(largest, current, error_out, first - 1)
-            for j in range(LANES):
-                accepted_out[first - 1, j] = accepted[j]
-                discrepancy_out[first - 1, j] = discrepancy[j]
-                discrepancy[j] = 0.0
-                accepted[j] = True
+            note_step((discrepancy, accepted), largest, current, status, first - 1)
         if all_diverged:
             break
 

@@ -181,6 +181,22 @@ def scaled_error(largest, x, errors, interval):
 
 
 @njit(**LEAN)
+def note_step(judged, largest, x, status, interval):
+    """status = (accepted, discrepancy, local error)[interval] = what has come up since the last note, which starts anew.
+
+    judged = (discrepancy, accepted) (LANES,); see `scaled_error` for the local error.
+    """
+    discrepancy, accepted = judged
+    accepted_out, discrepancy_out, error_out = status
+    scaled_error(largest, x, error_out, interval)
+    for j in range(LANES):
+        accepted_out[interval, j] = accepted[j]
+        discrepancy_out[interval, j] = discrepancy[j]
+        discrepancy[j] = 0.0
+        accepted[j] = True
+
+
+@njit(**LEAN)
 def write_output(output, exact, position, velocity, h, states, k, newest, rows):
     """Write output row `output`: the newest step end, or the Hermite polynomial through the last three.
 
