@@ -1,0 +1,119 @@
+"""The two nouns of a simulation: who integrates (`Integrator`), and what is integrated (`Ensemble`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.integrators.block import simulate_block
+from fatigue_runner.integrators.methods import METHODS, Method
+from fatigue_runner.integrators.pitch import PitchSeries
+from fatigue_runner.naming import integrator_id, integrator_label
+
+if TYPE_CHECKING:
+    from fatigue_runner.trajectory import Trajectory
+    from fatigue_runner.turbine import Turbine
+    from fatigue_runner.wind import WindSource
+
+Array = NDArray[np.float64]
+
+ENHANCED, HYBRID = "enhanced", "hybrid"
+MODES = (ENHANCED, HYBRID)
+
+
+@dataclass(frozen=True)
+class Integrator:
+    """A method at a step [s], alone or with a learned corrector in a mode: `enhanced`, or `hybrid`, which guards it.
+
+    Raises InputError for an unknown method or mode and for a step that is not positive.
+    """
+
+    method: str
+    step: float
+    corrector: Any = None  # a corrector.Corrector; what is needed of it: `correcting.prepare`
+    mode: str = ENHANCED
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise InputError(f"unknown method {self.method!r}{did_you_mean(self.method, METHODS)}")
+        if not (self.step > 0 and np.isfinite(self.step)):
+            raise InputError(f"step must be a positive number of seconds, got {self.step!r}")
+        if self.mode not in MODES:
+            raise InputError(f"unknown mode {self.mode!r}{did_you_mean(self.mode, MODES)}")
+
+    @property
+    def found(self) -> Method:
+        """The method itself."""
+        return METHODS[self.method]
+
+    @property
+    def corrector_name(self) -> str:
+        """Empty where there is none."""
+        return "" if self.corrector is None else str(self.corrector.name)
+
+    @property
+    def corrected_mode(self) -> str:
+        """The mode; empty without a corrector, where it means nothing."""
+        return "" if self.corrector is None else self.mode
+
+    @property
+    def id(self) -> str:
+        """Fit for a file name: `heun_10ms_hybrid_heun-10ms`."""
+        return integrator_id(self.method, self.step, self.corrector_name, self.corrected_mode)
+
+    @property
+    def label(self) -> str:
+        """As a person reads it: `heun 10 ms`, `heun-10ms, hybrid`."""
+        return integrator_label(self.method, self.step, self.corrector_name, self.corrected_mode)
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Cases of one turbine that share duration and output: n winds, each with its state (16,) at t = 0.
+
+    initial (n, 16); duration, output_step [s] (None: output at every step); pitch [rad]: a number or a PitchSeries, the same for
+    all. Winds need not share a time grid: `simulate` groups them. Raises InputError where the shapes do not fit.
+    """
+
+    turbine: Turbine
+    winds: Sequence[WindSource]
+    initial: Array
+    duration: float
+    output_step: float | None = None
+    pitch: float | PitchSeries = 0.0
+
+    def __len__(self) -> int:
+        return len(self.winds)
+
+    def part(self, chosen: Sequence[int]) -> Ensemble:
+        """The cases of these numbers."""
+        return replace(self, winds=[self.winds[i] for i in chosen], initial=self.initial[list(chosen)])
+
+    def groups(self) -> list[list[int]]:
+        """Numbers of the cases that may advance together: those whose winds share a time grid."""
+        by_key: dict[float | None, list[int]] = {}
+        for i, wind in enumerate(self.winds):
+            by_key.setdefault(wind.cell_key, []).append(i)
+        return list(by_key.values())
+
+
+def simulate(ensemble: Ensemble, integrator: Integrator) -> list[Trajectory]:
+    """One trajectory per case, in the order of the winds; a case's result does not depend on the others.
+
+    The last step ends at or after the duration. Raises InputError for impossible numbers and for a corrector that does not fit.
+    """
+    out: list[Any] = [None] * len(ensemble)
+    for chosen in ensemble.groups():
+        part = ensemble.part(chosen)
+        block = simulate_block(
+            part.turbine, integrator.method, integrator.step, part.winds, part.initial, part.duration, part.output_step,
+            pitch=part.pitch, corrector=integrator.corrector, mode=integrator.mode,
+        )  # fmt: skip
+        for i, trajectory in zip(chosen, block, strict=True):
+            out[i] = trajectory
+    return out
