@@ -73,10 +73,8 @@ def check_integrators(campaign: Campaign, turbine: Any, source: Source) -> None:
 
 def _check_varying_pitch(integration: Integration, source: Source) -> None:
     from fatigue_runner.integrators import method
-    from fatigue_runner.integrators.multistep import LinearMultistep
-    from fatigue_runner.integrators.tableaux import ButcherTableau
 
-    if integration.corrector or not isinstance(method(integration.method), ButcherTableau | LinearMultistep):
+    if integration.corrector or not method(integration.method).varying_pitch:
         what = f"corrector {integration.corrector}" if integration.corrector else integration.method
         raise InputError(
             f"{source.where(integration.path)}: {what} is made for one pitch; with a pitch that varies in time use "

@@ -32,6 +32,14 @@ class ExponentialRungeKutta:
     source: str
     evaluations_per_step: int
 
+    @property
+    def varying_pitch(self) -> bool:
+        return False  # its matrices belong to one pitch
+
+    @property
+    def correctable(self) -> bool:
+        return False
+
     def evaluations(self, steps: int) -> int:
         """Of a run of `steps` steps, with the initial slope."""
         return 1 + steps * self.evaluations_per_step

@@ -45,6 +45,14 @@ class ExponentialAdams:
     past: int
     evaluations_per_step: int = 1
 
+    @property
+    def varying_pitch(self) -> bool:
+        return False  # its matrices belong to one pitch
+
+    @property
+    def correctable(self) -> bool:
+        return True
+
     def evaluations(self, steps: int) -> int:
         """Of a run of `steps` steps, with the initial slope and the start."""
         return 1 + min(steps, self.past - 1) * 4 * STARTING + steps

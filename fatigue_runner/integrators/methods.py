@@ -30,6 +30,15 @@ class Method(Protocol):
     def source(self) -> str: ...
     @property
     def evaluations_per_step(self) -> int: ...
+    @property
+    def varying_pitch(self) -> bool:
+        """Whether it takes a pitch that varies in time."""
+        ...
+
+    @property
+    def correctable(self) -> bool:
+        """Whether correctors are made for methods of its kind."""
+        ...
 
     def evaluations(self, steps: int) -> int:
         """Evaluations of f in a run of `steps` steps, the initial one and a start-up included."""

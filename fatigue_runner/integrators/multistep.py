@@ -42,6 +42,14 @@ class LinearMultistep:
             raise ValueError(f"{self.name}: its start {self.start.name} would spoil order {self.order}")
 
     @property
+    def varying_pitch(self) -> bool:
+        return True
+
+    @property
+    def correctable(self) -> bool:
+        return False  # its start and its history would need correctors of their own
+
+    @property
     def evaluations_per_step(self) -> int:
         """Without the start; `evaluations` has it."""
         return 1 if self.corrector is None else 2

@@ -57,6 +57,14 @@ class ButcherTableau:
         return self.stages > 1 and self.b[-1] == 0 and tuple(self.A[-1]) == tuple(self.b[: len(self.A[-1])])
 
     @property
+    def varying_pitch(self) -> bool:
+        return True
+
+    @property
+    def correctable(self) -> bool:
+        return True
+
+    @property
     def evaluations_per_step(self) -> int:
         return self.stages - self.first_same_as_last
 
