@@ -123,7 +123,8 @@ def modes() -> Iterator[Check]:
 
 def equations() -> Iterator[tuple[str, str, str]]:
     """(check, against what, result) of the equations of motion, with the helpers of the tests."""
-    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+    tests = Path(__file__).resolve().parents[1] / "tests"
+    sys.path[:0] = [str(tests / "turbine"), str(tests)]
     import cadynturb
     import test_equations as t
 

@@ -6,13 +6,12 @@ from __future__ import annotations
 import copy
 import dataclasses
 import json
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import SHARED
 from ruamel.yaml import YAML
 
 from fatigue_runner.errors import InputError
@@ -31,8 +30,7 @@ from fatigue_runner.turbine.parameters import DATA, read_turbine_file
 from fatigue_runner.turbine.table_builder import PITCH_DEG, TABLE_NAMES, TIP_SPEED_RATIO, load_coefficients
 from fatigue_runner.turbine.tables import read_tables
 
-SHARED = Path(os.environ.get("FATIGUE_RUNNER_SHARED", Path(__file__).resolve().parents[2] / "shared"))
-CADYNTURB = SHARED / "data" / "t2b1i1cg_params.json"
+CADYNTURB = SHARED / "t2b1i1cg_params.json"
 PARAMETERS = {name: read_turbine_file(name) for name in ("nrel5mw", "t2b1i1cg")}
 AIRFOILS = YAML(typ="safe").load(DATA / "nrel5mw_airfoils.yaml")
 FLAT, CONED = (

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from logbook_example import RUN, differing, example, same_bits
+from places import ROOT, TESTS
 
 from fatigue_runner.logbook import (
     LogError,
@@ -141,7 +142,7 @@ def test_an_interrupted_run_leaves_a_part_file_with_every_row(tmp_path):
 _ENDLESS = """
 import sys
 from itertools import pairwise
-sys.path.insert(0, {tests!r})
+sys.path[:0] = {folders!r}
 from logbook_example import example
 from test_logbook_live import blocks
 from fatigue_runner.logbook import LogWriter
@@ -154,10 +155,9 @@ for block in blocks(example(), *[10] * 39):
 
 def test_a_killed_run_can_be_read_and_repaired(tmp_path):
     path = tmp_path / "a.mcap"
-    code = _ENDLESS.format(tests=str(Path(__file__).parent), path=str(path))
-    root = Path(__file__).parents[1]
+    code = _ENDLESS.format(folders=[str(Path(__file__).parent), str(TESTS)], path=str(path))
     with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=root, env=os.environ
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=ROOT, env=os.environ
     ) as process:
         assert process.stdout is not None
         for line in process.stdout:

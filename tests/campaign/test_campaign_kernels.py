@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import CAMPAIGNS
 
 import fatigue_runner as fr
 from fatigue_runner.campaign import run_campaign
@@ -19,7 +20,6 @@ from fatigue_runner.channels import LOAD_NAMES
 from fatigue_runner.errors import InputError
 from fatigue_runner.logbook import read_log
 
-CAMPAIGNS = Path(__file__).parents[1] / "campaigns"
 SHIPPED = sorted(
     set(CAMPAIGNS.glob("*.yaml")) - {CAMPAIGNS / "work_precision.yaml"}
 )  # that one is a benchmark's

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import copy
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import TURBINE_DATA as DATA
 from ruamel.yaml import YAML
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.turbine.beam import INTEGRAND_NAMES, blade_modes, columns, tower_modes
 from fatigue_runner.turbine.finite_elements import Beam, blade_beam, clamped_frequencies, tower_beam
 
-DATA = Path(__file__).parents[1] / "fatigue_runner" / "turbine" / "data"
 PARAMETERS = YAML(typ="safe").load(DATA / "nrel5mw.yaml")
 BLADE = blade_modes(PARAMETERS)
 TOWER = tower_modes(PARAMETERS)

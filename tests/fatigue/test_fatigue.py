@@ -2,23 +2,21 @@
 
 import json
 import math
-import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import SHARED
 
 from fatigue_runner import fatigue as fa
 from fatigue_runner.errors import InputError
 from fatigue_runner.fatigue.damage import channel_condition
 from fatigue_runner.fatigue.lifetime import IEC_REFERENCE_SPEED
 
-SHARED = Path(os.environ.get("FATIGUE_RUNNER_SHARED", Path(__file__).resolve().parents[2] / "shared"))
-CASES_FILE = SHARED / "data" / "fatigue_cases.json"
+CASES_FILE = SHARED / "fatigue_cases.json"
 CASES = json.loads(CASES_FILE.read_text()) if CASES_FILE.exists() else []
 
 # ASTM E1049-85, figure 6; the damage follows by hand from the standard's counts of each range.

@@ -13,6 +13,7 @@ from logbook_example import RUN, differing, example, same_bits
 from mcap.reader import make_reader
 from mcap.records import Schema
 from mcap.writer import CompressionType, Writer
+from places import ROOT
 
 from fatigue_runner import channels
 from fatigue_runner.logbook import LogError, check, read_log, write_log
@@ -134,7 +135,7 @@ def test_a_field_of_a_later_version_is_kept_or_ignored_but_never_mistaken(tmp_pa
 
 
 def test_the_ten_lines_of_python_in_the_manual_work(tmp_path, monkeypatch, capsys):
-    manual = (Path(__file__).parents[1] / "docs" / "logs.md").read_text(encoding="utf-8")
+    manual = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", manual, flags=re.DOTALL)
     monkeypatch.chdir(tmp_path)
     write_log("case.mcap", example(3), RUN)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import CORRECTORS
 
 from fatigue_runner.errors import InputError
 
@@ -19,7 +20,6 @@ from fatigue_runner.integrators import simulate_block
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind
 
-CORRECTORS = Path(__file__).parents[1] / "correctors"
 TINY = {
     "name": "tiny",
     "method": "heun",

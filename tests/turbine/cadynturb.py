@@ -7,14 +7,9 @@ CADynTurb's conventions (model/T2B1i1cG in jgeisler0303/CADynTurb): cf and ce ar
 from __future__ import annotations
 
 import json
-import os
-from pathlib import Path
 
 import numpy as np
-
-SHARED = (
-    Path(os.environ.get("FATIGUE_RUNNER_SHARED", Path(__file__).resolve().parents[2] / "shared")) / "data"
-)
+from places import SHARED
 
 
 def parameters(data: dict) -> dict[str, float]:

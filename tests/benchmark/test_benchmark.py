@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import CORRECTORS
 from typer.testing import CliRunner
 
 from fatigue_runner.benchmark import adaptive, cases, entries, page, points, text, work_precision
@@ -62,7 +62,7 @@ def test_no_training_wind_has_a_seed_of_the_benchmarks():
 
     yaml = ruamel.yaml.YAML(typ="safe")
     found = 0
-    for path in Path("correctors").glob("*.yaml"):
+    for path in CORRECTORS.glob("*.yaml"):
         data = yaml.load(path)
         if data.get("family") == "affine" and data["training"].get("type") == "turbulent":
             recipe = parse_affine(data)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import TURBINE_DATA
 from typer.testing import CliRunner
 from viewer_example import motion, write
 
@@ -80,7 +81,7 @@ def test_turbine_is_the_one_that_the_attached_campaign_names(tmp_path):
 
 def test_attached_turbine_is_drawn_also_where_its_file_is_gone_or_has_changed(tmp_path):
     path = tmp_path / "case.mcap"
-    text = (Path(cases.__file__).parents[1] / "turbine" / "data" / "nrel5mw.yaml").read_text()
+    text = (TURBINE_DATA / "nrel5mw.yaml").read_text()
     own = text.replace("precone_deg: -2.5", "precone_deg: -1.5")
     assert own != text
     attached = {"campaign.yaml": b"turbine: /gone/own.yaml\n", "turbine.yaml": own.encode()}
