@@ -19,6 +19,7 @@ FLOOR = {"errors", "channels", "naming", "trajectory", "accuracy", "compiled"}
 
 # Which rooms a room may import. A new room is one line here.
 MAY_IMPORT = {
+    "inputs": set(),
     "turbine": set(),
     "wind": set(),
     "fatigue": set(),
@@ -27,8 +28,9 @@ MAY_IMPORT = {
     "corrector": {"turbine", "wind", "integrators"},
     "report": {"fatigue", "logbook"},
     "viewer": {"logbook", "turbine"},
-    "campaign": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "report"},
+    "campaign": {"inputs", "turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "report"},
     "benchmark": {
+        "inputs",
         "turbine",
         "wind",
         "integrators",

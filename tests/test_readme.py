@@ -39,8 +39,8 @@ def test_the_architecture_table_names_every_package_and_none_that_is_not_there()
 def test_the_campaign_of_the_readme_is_valid():
     from ruamel.yaml import YAML
 
-    from fatigue_runner.campaign.source import Source
     from fatigue_runner.campaign.spec import parse_campaign
+    from fatigue_runner.inputs.source import Source
 
     (text,) = blocks("yaml")
     campaign = parse_campaign(Source("README.md", YAML(typ="safe").load(text)))

@@ -16,10 +16,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from fatigue_runner.campaign.section import Section, input_error, problem
-from fatigue_runner.campaign.source import Source, read_source
-from fatigue_runner.campaign.sweep import Sweep, expand
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.inputs.section import Section, input_error, problem
+from fatigue_runner.inputs.source import Source, read_source
+from fatigue_runner.inputs.sweep import Sweep, expand
 
 # Seeds 9000 to 9999 are the benchmarks': correctors are trained on seeds from 100,000 on.
 SEEDS = range(9000, 10_000)

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner.campaign.source import Source
 from fatigue_runner.campaign.spec import Campaign, Integrator, Wind
-from fatigue_runner.campaign.sweep import expand
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.source import Source
+from fatigue_runner.inputs.sweep import expand
 
 # The code that decides the figures of a case.
 NUMERICAL_CODE = (

@@ -13,10 +13,10 @@ import numpy as np
 from fatigue_runner.campaign import checks
 from fatigue_runner.campaign.block import Job, Setup
 from fatigue_runner.campaign.cases import Case, blocks, code_hash, integrations, make_cases, wind_cases
-from fatigue_runner.campaign.source import Source, read_source
 from fatigue_runner.campaign.spec import Campaign, parse_campaign
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.source import Source, read_source
 
 # Winds per block: the width of the lane kernel. A block is what progress counts in and what Ctrl-C can lose.
 BLOCK_SIZE = 16

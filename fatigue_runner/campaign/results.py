@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner.campaign.files import write_atomically
 from fatigue_runner.channels import LOAD_NAMES, STATE_NAMES
+from fatigue_runner.inputs.files import write_atomically
 
 _CASE = (
     *(

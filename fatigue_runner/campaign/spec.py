@@ -54,11 +54,11 @@ from pydantic import (
     model_validator,
 )
 
-from fatigue_runner.campaign.section import Section, input_error, problem
-from fatigue_runner.campaign.source import Source
-from fatigue_runner.campaign.sweep import Piece, Sweep, as_list, check_not_empty, expand
 from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.inputs.section import Section, input_error, problem
+from fatigue_runner.inputs.source import Source
+from fatigue_runner.inputs.sweep import Piece, Sweep, as_list, check_not_empty, expand
 
 if TYPE_CHECKING:
     from fatigue_runner.integrators.pitch import PitchSeries

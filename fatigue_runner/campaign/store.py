@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import IO, Any
 
 from fatigue_runner.campaign.cases import Case
-from fatigue_runner.campaign.files import write_atomically
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.files import write_atomically
 
 # What all cases of a folder have in common. Where it differs, no finished case could be kept.
 _IDENTITY = ("name", "code", "turbine_hash", "duration", "output_rate", "initial", "pitch")

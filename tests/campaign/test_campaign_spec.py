@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fatigue_runner.campaign.source import read_source
 from fatigue_runner.campaign.spec import Campaign, parse_campaign
-from fatigue_runner.campaign.sweep import Random, Range, expand
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.source import read_source
+from fatigue_runner.inputs.sweep import Random, Range, expand
 
 MINIMAL = """\
 name: sweep

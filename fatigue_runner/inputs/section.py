@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from fatigue_runner.campaign.source import Source
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.inputs.source import Source
 
 # Tags of pydantic's unions start with this, so that they cannot be taken for keys of the file.
 TAG = "~"

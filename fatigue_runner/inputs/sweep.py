@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from fatigue_runner.campaign.section import TAG, Section, problem
+from fatigue_runner.inputs.section import TAG, Section, problem
 
 # One campaign file must not ask for more cases than a disk or a person could take.
 MAX_VALUES = 100_000
