@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from fatigue_runner._version import __version__
+
 if TYPE_CHECKING:
     from fatigue_runner.api import (
         ConstantWind,
@@ -26,8 +28,6 @@ if TYPE_CHECKING:
         run_campaign,
         simulate,
     )
-
-__version__ = "0.1.0"
 
 __all__ = [
     "ConstantWind",

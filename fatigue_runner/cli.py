@@ -56,7 +56,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from fatigue_runner import __version__
+        from fatigue_runner._version import __version__
 
         typer.echo(f"fatigue-runner {__version__}")
         raise typer.Exit

@@ -7,7 +7,6 @@ campaign file is fine, too: one set of cases. What a file lists as `integrators`
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,7 +22,6 @@ from fatigue_runner.inputs.sweep import Sweep, expand
 
 # Seeds 9000 to 9999 are the benchmarks': correctors are trained on seeds from 100,000 on.
 SEEDS = range(9000, 10_000)
-PACKAGE = Path(__file__).parents[1]
 # What a campaign must have and the benchmark does not need: all methods run at the benchmark's steps.
 _ANY = [{"method": "rk4", "step": 0.01}]
 
@@ -103,14 +101,6 @@ class Cases:
 
 # Of files that name none; its quality is measured in every run.
 REFERENCE = {"method": "dop853", "step": 0.005}
-
-
-def shipped(name: str = "work_precision.yaml") -> Path:
-    """A shipped campaign: beside the package in a source tree, in `share/` of the environment where a wheel was installed."""
-    for folder in (PACKAGE.parent, Path(sys.prefix) / "share" / "fatigue-runner"):
-        if (folder / "campaigns" / name).is_file():
-            return folder / "campaigns" / name
-    raise InputError(f"the shipped campaigns/{name} is not installed; give a campaign file")
 
 
 def load(campaign: str | Path | Mapping[str, Any]) -> tuple[list[Cases], Settings]:

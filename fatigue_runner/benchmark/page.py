@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from fatigue_runner import shipped
 from fatigue_runner.benchmark import answers, figures, kernel, machine, network, text, work_precision
-from fatigue_runner.benchmark.cases import load, shipped
+from fatigue_runner.benchmark.cases import load
 
 COMMAND = "fatigue-runner benchmark work-precision --out docs"
 
@@ -32,7 +33,7 @@ def measure(
     another version.
     """
     began = time.perf_counter()
-    sets, settings = load(shipped() if campaign is None else campaign)
+    sets, settings = load(shipped.campaign("work_precision") if campaign is None else campaign)
     same = work_precision.identity(sets, settings)
     if earlier is None:
         parts = work_precision.errors(sets, settings, workers, say)

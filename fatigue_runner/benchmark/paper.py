@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from fatigue_runner import shipped
 from fatigue_runner.benchmark import machine
-from fatigue_runner.benchmark.cases import Cases, load, shipped
+from fatigue_runner.benchmark.cases import Cases, load
 from fatigue_runner.benchmark.entries import ENHANCED, HYBRID, Entry, simulate
 from fatigue_runner.benchmark.targets import Target
 from fatigue_runner.benchmark.text import table
@@ -128,7 +129,7 @@ def both(
     else:
         chosen = [find(name) for name in names]
     inside, outside = (
-        measure(shipped(f"paper_{which}.yaml"), chosen, steps, say)
+        measure(shipped.campaign(f"paper_{which}"), chosen, steps, say)
         for which, steps in (("in_range", STEPS), ("out_of_range", BOXED))
     )
     return inside, outside

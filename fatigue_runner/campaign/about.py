@@ -8,7 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner import __version__
+from fatigue_runner._version import __version__
 
 LIBRARIES = ("numpy", "scipy", "numba")
 

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from fatigue_runner import shipped
 from fatigue_runner.corrector.artefact import Corrector, CorrectorError, load
 from fatigue_runner.errors import did_you_mean
 
 SUFFIX = ".safetensors"
-PACKAGE = Path(__file__).parents[1]
-
-
-def shipped_folders() -> list[Path]:
-    """`correctors/` beside the package in a source tree, `share/` of the environment where a wheel was installed (pyproject.toml)."""
-    installed = Path(sys.prefix) / "share" / "fatigue-runner" / "correctors"
-    return [folder for folder in (PACKAGE.parent / "correctors", installed) if folder.is_dir()]
 
 
 def files(more: Sequence[Path] = ()) -> dict[str, Path]:
     """{name: file} of all correctors; a file of the folders `more` goes before a shipped one of the same name."""
     found: dict[str, Path] = {}
-    for folder in (*more, *shipped_folders()):
+    for folder in (*more, shipped.correctors()):
         for path in sorted(folder.glob(f"*{SUFFIX}")):
             found.setdefault(path.name.removesuffix(SUFFIX), path)
     return found

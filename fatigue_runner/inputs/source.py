@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fatigue_runner import shipped
 from fatigue_runner.errors import InputError
 
 # Aliases (`&a`, `*a`) can nest into each other and grow without bound from a few bytes of text.
@@ -87,6 +88,7 @@ class Source:
 def read_source(campaign: str | Path | Mapping[str, Any]) -> Source:
     """Read a campaign YAML (1.2: `1e7` is a number, duplicate keys are refused) or take a mapping as it is.
 
+    A bare word such as `quickstart` that is no file here names a shipped campaign.
     Raises InputError for a missing or unreadable file and for text that is not YAML, with its line.
     """
     if isinstance(campaign, Mapping):
@@ -95,6 +97,8 @@ def read_source(campaign: str | Path | Mapping[str, Any]) -> Source:
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     path = Path(campaign)
+    if path.name == str(campaign) and not path.suffix and not path.exists():
+        path = shipped.campaign(path.name)
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:

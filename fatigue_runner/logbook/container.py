@@ -31,7 +31,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from fatigue_runner import __version__
+from fatigue_runner._version import __version__
 
 MAGIC = b"\x89MCAP0\r\n"
 CHECKSUM_KEY = "crc32"

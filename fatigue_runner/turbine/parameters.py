@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from fatigue_runner import shipped
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.turbine.beam import INTEGRAND_NAMES, BladeModes, TowerModes, blade_modes, tower_modes
 
-DATA = Path(__file__).parent / "data"
+DATA = shipped.turbines()
 
 # integrals of the equations by their factors in beam.INTEGRAND_NAMES
 _INTEGRALS = {

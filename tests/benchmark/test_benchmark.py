@@ -9,7 +9,8 @@ import pytest
 from places import CORRECTORS
 from typer.testing import CliRunner
 
-from fatigue_runner.benchmark import adaptive, cases, entries, page, points, text, work_precision
+from fatigue_runner import shipped
+from fatigue_runner.benchmark import adaptive, entries, page, points, text, work_precision
 from fatigue_runner.benchmark.cases import SEEDS, Settings, load
 from fatigue_runner.benchmark.commands import app
 from fatigue_runner.benchmark.entries import Entry
@@ -49,7 +50,7 @@ def timed(result):
 
 
 def test_the_shipped_campaign_has_turbulent_and_constant_winds_of_reserved_seeds():
-    sets, settings = load(cases.shipped())
+    sets, settings = load(shipped.campaign("work_precision"))
     assert {c.turbulent for c in sets} == {True, False}
     assert {w.parameters["seed"] for c in sets if c.turbulent for w in c.winds} <= set(SEEDS)
     assert settings.methods is None and settings.correctors is None  # nothing is left out
@@ -73,7 +74,7 @@ def test_no_training_wind_has_a_seed_of_the_benchmarks():
 
 
 def test_every_registered_method_and_every_shipped_corrector_meets_the_shipped_cases():
-    sets, settings = load(cases.shipped())
+    sets, settings = load(shipped.campaign("work_precision"))
     for c in sets:
         work = list(work_precision.jobs(0, c, settings, points.Reference([], [])))
         assert {job.method for job in work if job.method and not job.tolerance} == set(METHODS)
