@@ -33,6 +33,10 @@ class ExponentialRungeKutta:
     evaluations_per_step: int
 
     @property
+    def family(self) -> str:
+        return "exponential-runge-kutta"
+
+    @property
     def varying_pitch(self) -> bool:
         return False  # its matrices belong to one pitch
 

@@ -46,6 +46,10 @@ class ExponentialAdams:
     evaluations_per_step: int = 1
 
     @property
+    def family(self) -> str:
+        return "exponential-adams"
+
+    @property
     def varying_pitch(self) -> bool:
         return False  # its matrices belong to one pitch
 

@@ -31,6 +31,11 @@ class Method(Protocol):
     @property
     def evaluations_per_step(self) -> int: ...
     @property
+    def family(self) -> str:
+        """What its learned corrections have in common: `runge-kutta`, `adams`, `exponential-runge-kutta`, `exponential-adams`."""
+        ...
+
+    @property
     def varying_pitch(self) -> bool:
         """Whether it takes a pitch that varies in time."""
         ...

@@ -42,6 +42,10 @@ class LinearMultistep:
             raise ValueError(f"{self.name}: its start {self.start.name} would spoil order {self.order}")
 
     @property
+    def family(self) -> str:
+        return "adams"
+
+    @property
     def varying_pitch(self) -> bool:
         return True
 

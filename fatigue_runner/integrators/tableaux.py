@@ -57,6 +57,10 @@ class ButcherTableau:
         return self.stages > 1 and self.b[-1] == 0 and tuple(self.A[-1]) == tuple(self.b[: len(self.A[-1])])
 
     @property
+    def family(self) -> str:
+        return "runge-kutta"
+
+    @property
     def varying_pitch(self) -> bool:
         return True
 
