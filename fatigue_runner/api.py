@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fatigue_runner.campaign import run_campaign
-from fatigue_runner.campaign.initial import initial_state
-from fatigue_runner.campaign.spec import INITIAL_STATES
 from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.fatigue import damage_equivalent_load, rainflow
+from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
 from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind, SeriesWind, StepWind, TurbulentWind, WindSource

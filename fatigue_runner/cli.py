@@ -220,8 +220,8 @@ def train(
 
         fatigue-runner train correctors/rk4-100ms.yaml --step 0.08 --name rk4-80ms --out runs
     """
-    from fatigue_runner.campaign.initial import initial_state
     from fatigue_runner.cli_tables import train_with_progress, tune_with_progress
+    from fatigue_runner.integrators.initial import initial_state
 
     overrides: dict[str, Any] = {"step": step, "seed": seed, "name": name}
     if tune:

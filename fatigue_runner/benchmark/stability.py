@@ -25,8 +25,8 @@ def measure(
     chosen: correctors, default every shipped one that fits its turbine. Mean speeds 5 to 10 m/s, one seed each.
     Raises InputError for more seeds than are kept for benchmarks.
     """
-    from fatigue_runner.campaign.initial import initial_state
     from fatigue_runner.corrector import correctors
+    from fatigue_runner.integrators.initial import initial_state
     from fatigue_runner.turbine import load_turbine
     from fatigue_runner.wind import TurbulentWind
 

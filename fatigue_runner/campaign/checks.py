@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.campaign.cases import Integration, WindCase, integrations, resolve
-from fatigue_runner.campaign.initial import initial_state
 from fatigue_runner.campaign.spec import Campaign, Pitch
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.source import Source
+from fatigue_runner.integrators.initial import initial_state
 
 # Above this the tip-speed ratio of a 5-MW-sized rotor leaves the aerodynamic tables for good.
 HIGHEST_WIND_SPEED = 40.0

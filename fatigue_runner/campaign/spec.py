@@ -59,11 +59,11 @@ from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, input_error, problem
 from fatigue_runner.inputs.source import Source
 from fatigue_runner.inputs.sweep import Piece, Sweep, as_list, check_not_empty, expand
+from fatigue_runner.integrators.initial import INITIAL_STATES
 
 if TYPE_CHECKING:
     from fatigue_runner.integrators.pitch import PitchSeries
 
-INITIAL_STATES = ("operating-point", "paper", "paper-spinning")
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 
 

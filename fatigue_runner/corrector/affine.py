@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
 Say = Callable[[str], None]
-InitialState = Callable[[Any, str, Any], Any]  # `campaign.initial.initial_state`
+InitialState = Callable[[Any, str, Any], Any]  # `integrators.initial.initial_state`
 
 
 def starts(turbine: Turbine, winds: list[Any], initial: str, initial_state: InitialState | None) -> Any:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
 Array = NDArray[np.float64]
-# state (16,) at t = 0 from turbine, name of the initial state and wind: `campaign.initial.initial_state`
+# state (16,) at t = 0 from turbine, name of the initial state and wind: `integrators.initial.initial_state`
 InitialState = Callable[[Any, str, Any], Array]
 
 

@@ -13,10 +13,10 @@ from fatigue_runner.errors import InputError
 
 pytest.importorskip("torch", reason="training needs the extra `train`")
 
-from fatigue_runner.campaign.initial import initial_state
 from fatigue_runner.corrector import artefact
 from fatigue_runner.corrector.training_recipe import parse_recipe, read_recipe, sample_sets, train_recipe
 from fatigue_runner.integrators import simulate_block
+from fatigue_runner.integrators.initial import initial_state
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind
 

@@ -9,6 +9,8 @@ import numpy as np
 
 from fatigue_runner.channels import STATE_NAMES
 
+INITIAL_STATES = ("operating-point", "paper", "paper-spinning")
+
 
 def initial_state(turbine: Any, initial: str | Any, wind: Any, pitch: float = 0.0) -> np.ndarray:
     """State (16,) at t = 0 in the order of `channels.STATES` for a wind source; pitch [rad].
