@@ -17,7 +17,7 @@ from places import CAMPAIGNS, CORRECTORS, ROOT, TURBINE_DATA
 import fatigue_runner
 from fatigue_runner import shipped
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs import read_source
+from fatigue_runner.inputs.source import read_source
 
 
 def test_a_checkout_ships_the_folders_at_its_top():
