@@ -12,3 +12,12 @@ def integrator_id(method: str, step: float, corrector: str = "", mode: str = "")
 def integrator_label(method: str, step: float, corrector: str = "", mode: str = "") -> str:
     """`heun 10 ms`, or `heun-10ms, hybrid`: a corrector's name says its method and step."""
     return f"{corrector}, {mode}" if corrector else f"{method} {step * 1e3:g} ms"
+
+
+# What a corrector's family is called where a person reads: both are networks, the second one the paper's own.
+FAMILIES = {"mlp": "network", "paper": "network"}
+
+
+def integrator_series(method: str, family: str = "", mode: str = "") -> str:
+    """What integrators at any step have in common: `heun`, `heun + network, hybrid`; family: that of the corrector."""
+    return f"{method} + {FAMILIES.get(family, family)}, {mode}" if family else method

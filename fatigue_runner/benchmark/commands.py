@@ -74,12 +74,13 @@ def kernel(
 
         fatigue-runner benchmark kernel --json kernel.json
     """
-    from fatigue_runner.benchmark import kernel as measured
-    from fatigue_runner.benchmark import network, text
+    from fatigue_runner.benchmark.pages.work_precision import speed
+    from fatigue_runner.benchmark.speed import kernel as measured
+    from fatigue_runner.benchmark.speed import network
 
     result = measured.measure(repeats)
     result["network"] = network.measure_with_one_thread(max(3, repeats // 2))
-    typer.echo("\n".join([*text.kernel(result), "", *text.network(result["network"])]))
+    typer.echo(f"{speed('kernel', result)}\n\n{speed('network', result['network'])}")
     _write(result, json)
 
 
@@ -137,14 +138,15 @@ def work_precision(
 
         fatigue-runner benchmark work-precision --reuse errors.json --out docs
     """
-    from fatigue_runner.benchmark import page, text
+    from fatigue_runner.benchmark.pages import work_precision as page
+    from fatigue_runner.benchmark.run import measure
 
     earlier = None if reuse is None else (_read(reuse), str(reuse))
-    result = page.measure(
+    result = measure(
         campaign, rounds=rounds, workers=workers, timed=not errors_only, earlier=earlier, say=_say
     )
     for part in result["cases"]:
-        typer.echo("\n".join(text.cases(part)) + "\n")
+        typer.echo(page.section(part) + "\n")
     if out is not None:
         typer.echo(f"page: {_written(page.write, out, result, out, out / 'images')}")
     _write(result, json)
@@ -171,14 +173,15 @@ def paper(
 
         fatigue-runner benchmark paper --out docs
     """
-    from fatigue_runner.benchmark import paper as measured
+    from fatigue_runner.benchmark.pages import paper as page
+    from fatigue_runner.benchmark.study import paper as measured
 
     results = measured.both(correctors or None, _say)
     for result in results:
-        typer.echo("\n".join(measured.text(result)) + "\n")
-    typer.echo("\n".join(f"- {target}" for target in measured.judged(*results)))
+        typer.echo(page.section(result) + "\n")
+    typer.echo("\n".join(f"- {claim}" for claim in measured.claims(*results)))
     if out is not None:
-        typer.echo(f"page: {_written(measured.page, out, *results, out)}")
+        typer.echo(f"page: {_written(page.write, out, *results, out)}")
     _write([measured.to_json(r) for r in results], json)
 
 
@@ -194,10 +197,11 @@ def stability(
 
         fatigue-runner benchmark stability
     """
-    from fatigue_runner.benchmark import stability as measured
+    from fatigue_runner.benchmark.pages.work_precision import speed
+    from fatigue_runner.benchmark.study import stability as measured
 
     result = measured.measure(seeds, duration, _say)
-    typer.echo("\n".join(measured.text(result)))
+    typer.echo(speed("stability", result))
     _write(result, json)
 
 
@@ -215,12 +219,12 @@ def logs(
     """
     from rich.console import Console
 
-    from fatigue_runner.benchmark import logs as measured
+    from fatigue_runner.benchmark.pages import tables
+    from fatigue_runner.benchmark.speed import logs as measured
 
-    result = measured.benchmark_logs(rows, repeats)
-    Console().print(measured.table(result))
+    result = measured.measure(rows, repeats)
+    Console().print(tables.logs(result))
     _write(result, json)
-    raise typer.Exit(0 if result["met"] else 1)
 
 
 @app.command()
@@ -240,11 +244,11 @@ def live(
     """
     from rich.console import Console
 
-    from fatigue_runner.benchmark import live as measured
+    from fatigue_runner.benchmark.pages import tables
+    from fatigue_runner.benchmark.speed import live as measured
 
-    result = measured.measure(rounds, duration, at_once=at_once, say=lambda what: typer.echo(what, err=True))
+    result = measured.measure(rounds, duration, at_once=at_once, say=_say)
     console = Console()
     console.width = max(console.width, 110)
-    console.print(measured.table(result))
+    console.print(tables.live(result))
     _write(result, json)
-    raise typer.Exit(0 if result["met"] else 1)

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from fatigue_runner.benchmark.kernel import operations
+from fatigue_runner.benchmark.speed.kernel import operations
 
 pytestmark = pytest.mark.slow  # compiles everything anew
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fatigue_runner.benchmark import paper
-from fatigue_runner.benchmark.paper import Outcome
+from fatigue_runner.benchmark.study import paper
+from fatigue_runner.benchmark.study.paper import Outcome
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fatigue_runner.benchmark import paper
-from fatigue_runner.benchmark.paper_figures import draw
+from fatigue_runner.benchmark.pages import paper as page
+from fatigue_runner.benchmark.pages.paper_figures import draw
+from fatigue_runner.benchmark.study import paper
 from fatigue_runner.corrector.artefact import Corrector, Guard
 from fatigue_runner.turbine import load_turbine
 
@@ -72,7 +73,7 @@ def test_an_integrator_is_counted_worse_than_rk3_wind_by_wind(measured):
     enhanced = outcome(measured, "heun + network, enhanced", 0.01)
     assert paper.worse_than_rk3(measured, enhanced) == (3, pytest.approx(_largest_ratio(measured)))
     assert paper.worse_than_rk3(measured, outcome(measured, "heun", 0.01)) is None
-    assert "| 3 (at most" in "\n".join(paper.text(measured))
+    assert "| 3 (at most" in page.section(measured)
 
 
 def _largest_ratio(measured):
@@ -93,10 +94,10 @@ def test_a_tables_rows_are_of_the_chosen_winds(measured):
 
 def test_the_page_says_which_of_the_papers_claims_hold(measured, tmp_path):
     # a network of zeros is Heun, dearer than RK3 at its error; its hybrid is RK3, so nowhere worse
-    claims = paper.judged(measured, measured)
+    claims = paper.claims(measured, measured)
     hybrid = [t for t in claims if "hybrid" in t.asked]
     assert [t.reached for t in hybrid] == [True] * len(paper.BOXED) and "0 of 3 winds" in hybrid[0].found
-    written = paper.page(measured, measured, tmp_path).read_text(encoding="utf-8")
+    written = page.write(measured, measured, tmp_path).read_text(encoding="utf-8")
     assert all(str(t) in written for t in claims)
     assert all(
         (tmp_path / "images" / name).is_file() for name in ("paper-boxes.png", "paper-work-precision.png")

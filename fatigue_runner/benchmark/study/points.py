@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.benchmark.cases import Cases
-from fatigue_runner.benchmark.entries import CLASSICAL, Entry, simulate
+from fatigue_runner.benchmark.study.cases import Cases
+from fatigue_runner.benchmark.study.integrators import CLASSICAL, kind, series
+from fatigue_runner.integrators import HYBRID, Integrator
+from fatigue_runner.naming import integrator_label
 
 
 @dataclass
@@ -44,7 +46,7 @@ class Point:
 
     def __post_init__(self) -> None:
         self.series = self.series or self.method
-        self.label = self.label or f"{self.method} {self.step * 1e3:g} ms"
+        self.label = self.label or integrator_label(self.method, self.step)
 
     @property
     def corrected(self) -> bool:
@@ -58,13 +60,14 @@ class Point:
         return cls(**{f.name: values[f.name] for f in fields(cls) if f.name in values})
 
 
-def point_of(entry: Entry, cases: Cases, block: Sequence[Any]) -> Point:
+def point_of(integrator: Integrator, cases: Cases, block: Sequence[Any]) -> Point:
     """A point without its errors; evaluations per second of what was simulated, up to a divergence too."""
     rate = sum(t.evaluations for t in block) / max(sum(t.duration for t in block), cases.output_step)
-    hybrid = entry.mode == "hybrid"
+    hybrid = integrator.corrected_mode == HYBRID
     accepted = float(np.mean([t.accepted.mean() for t in block])) if hybrid else None
     return Point(
-        cases.name, entry.method, entry.step, rate, entry.series, entry.label, entry.kind, entry.name, accepted=accepted
+        cases.name, integrator.method, integrator.step, rate, series(integrator), integrator.label, kind(integrator),
+        integrator.corrector_name, accepted=accepted,
     )  # fmt: skip
 
 
@@ -103,11 +106,12 @@ def equivalent_loads(trajectory: Any, cases: Cases) -> dict[tuple[str, float], f
     return out
 
 
-def make_reference(cases: Cases, method: str, step: float) -> Reference:
+def make_reference(cases: Cases) -> Reference:
     """Raises InputError where the reference itself diverges."""
     from fatigue_runner.errors import InputError
 
-    block = [kept(t, cases) for t in simulate(cases, Entry(method, step))]
+    method, step = cases.reference.method, cases.reference.step
+    block = [kept(t, cases) for t in cases.run(cases.reference)]
     lost = [t.diverged_at for t in block if t.diverged_at is not None]
     if lost:
         raise InputError(
@@ -151,12 +155,13 @@ def reference_quality(cases: Cases, reference: Reference) -> list[dict[str, Any]
     from fatigue_runner.channels import STATE_NAMES
 
     moves = np.min([np.ptp(t.state, axis=0) for t in reference.trajectories], axis=0)
-    method, step = cases.reference
+    method, step = cases.reference.method, cases.reference.step
     other = "rk7" if method == "dop853" else "dop853"
     rows = []
     for name, size in ((method, step / 2), (other, step), (other, step / 2)):
-        block = simulate(cases, Entry(name, size))
-        point = evaluate(block, reference, cases, point_of(Entry(name, size), cases, block))
+        integrator = Integrator(name, size)
+        block = cases.run(integrator)
+        point = evaluate(block, reference, cases, point_of(integrator, cases, block))
         state = max(point.nrmse, key=lambda name: point.nrmse[name], default="")
         rows.append(
             {

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner.benchmark import answers
-from fatigue_runner.benchmark.entries import ADAPTIVE, ENHANCED, HYBRID
-from fatigue_runner.benchmark.points import Point
+from fatigue_runner.benchmark.study import answers
+from fatigue_runner.benchmark.study.integrators import ADAPTIVE
+from fatigue_runner.benchmark.study.points import Point
+from fatigue_runner.integrators import ENHANCED, HYBRID
 from fatigue_runner.report.style import COLOURS, FAINT, INK, LINES, QUIET, new_figure, styled
 
 # What is shown: errors above are of no use, errors below are closer than anybody asks.
@@ -186,7 +187,7 @@ def _plain(value: float) -> str:
 
 
 def write(results: Sequence[dict[str, Any]], folder: Path) -> list[str]:
-    """All figures as PNG in `folder`; returns their names."""
+    """All figures as PNG in `folder`; returns their names without `.png`."""
     folder.mkdir(parents=True, exist_ok=True)
     made: dict[str, Callable[[], Any]] = {
         "work-precision-time": lambda: error_over_cost(
@@ -200,7 +201,7 @@ def write(results: Sequence[dict[str, Any]], folder: Path) -> list[str]:
     for name, draw in made.items():
         with styled():
             draw().savefig(folder / f"{name}.png", dpi=150, metadata={"Software": None})
-    return [f"{name}.png" for name in made]
+    return list(made)
 
 
 def _microseconds(point: Point) -> float | None:

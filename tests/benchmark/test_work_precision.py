@@ -10,13 +10,16 @@ from places import CORRECTORS
 from typer.testing import CliRunner
 
 from fatigue_runner import shipped
-from fatigue_runner.benchmark import adaptive, entries, page, points, text, work_precision
-from fatigue_runner.benchmark.cases import SEEDS, Settings, load
+from fatigue_runner.benchmark import run
 from fatigue_runner.benchmark.commands import app
-from fatigue_runner.benchmark.entries import Entry
+from fatigue_runner.benchmark.pages import tables, words
+from fatigue_runner.benchmark.pages import work_precision as page
+from fatigue_runner.benchmark.pages.render import table
+from fatigue_runner.benchmark.study import adaptive, integrators, points, work_precision
+from fatigue_runner.benchmark.study.cases import SEEDS, Settings, load
 from fatigue_runner.corrector import correctors
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators import METHODS
+from fatigue_runner.integrators import METHODS, Integrator
 
 SMALL = {
     "name": "small",
@@ -36,7 +39,7 @@ SMALL = {
 
 @pytest.fixture(scope="module")
 def result():
-    return page.measure(SMALL, workers=1, timed=False)
+    return run.measure(SMALL, workers=1, timed=False)
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +55,7 @@ def timed(result):
 def test_the_shipped_campaign_has_turbulent_and_constant_winds_of_reserved_seeds():
     sets, settings = load(shipped.campaign("work_precision"))
     assert {c.turbulent for c in sets} == {True, False}
-    assert {w.parameters["seed"] for c in sets if c.turbulent for w in c.winds} <= set(SEEDS)
+    assert {w.parameters["seed"] for c in sets if c.turbulent for w in c.ensemble.winds} <= set(SEEDS)
     assert settings.methods is None and settings.correctors is None  # nothing is left out
 
 
@@ -78,11 +81,13 @@ def test_every_registered_method_and_every_shipped_corrector_meets_the_shipped_c
     for c in sets:
         work = list(work_precision.jobs(0, c, settings, points.Reference([], [])))
         assert {job.method for job in work if job.method and not job.tolerance} == set(METHODS)
-        present = {(e.name, e.mode) for job in work for e in job.entries}
+        present = {
+            (i.corrector_name, i.corrected_mode) for i in (job.integrator for job in work) if i is not None
+        }
         missing = {
             (s.name, mode)
             for s in correctors()
-            if s.turbine == c.turbine.name and s.turbine_hash == c.turbine.hash
+            if s.turbine == c.ensemble.turbine.name and s.turbine_hash == c.ensemble.turbine.hash
             for mode in ("enhanced", "hybrid")
         } - present
         assert not missing
@@ -91,17 +96,17 @@ def test_every_registered_method_and_every_shipped_corrector_meets_the_shipped_c
 def test_every_method_is_shown_beyond_its_stability_limit():
     c, settings = load({**SMALL, "benchmark": {}})[0][0], Settings()
     for name in METHODS:
-        largest = entries.limit(c, name)
-        steps, _ = entries.rungs(c, settings, name, largest)
+        largest = integrators.limit(c, name)
+        steps, _ = integrators.rungs(c, settings, name, largest)
         assert max(steps) > largest or largest >= max(settings.ladder)
 
 
 def test_steps_that_are_left_out_have_a_reason(result):
     c, settings = load(SMALL)[0][0], Settings(most_evaluations=100.0)
-    steps, reason = entries.rungs(c, settings, "heun", 0.03)
+    steps, reason = integrators.rungs(c, settings, "heun", 0.03)
     assert min(steps) == 0.02 and "15, 10, 7" in reason and "more than 100 evaluations" in reason
     close = Settings.model_validate({**SMALL["benchmark"], "finest": 1e-2})
-    reference = points.make_reference(c, *c.reference)
+    reference = points.make_reference(c)
     found = work_precision.descend(c, close, reference, "rk4")
     assert found["points"][-1].nrmse_max < 1e-2 and "steps below" in found["left_out"][0]
 
@@ -112,8 +117,8 @@ def test_what_a_campaign_lists_runs_beside_the_methods():
         {"method": "rk4", "step": 0.1, "corrector": "rk4-100ms", "mode": "enhanced"},
     ]
     c = load({**SMALL, "integrators": listed})[0][0]
-    found = entries.fitting(c, Settings(correctors=[]))[0]
-    assert [(e.method, e.step, e.name, e.mode) for e in found] == [
+    found = integrators.fitting(c, Settings(correctors=[]))[0]
+    assert [(i.method, i.step, i.corrector_name, i.corrected_mode) for i in found] == [
         ("rk4", 0.0123, "", ""),
         ("rk4", 0.1, "rk4-100ms", "enhanced"),
     ]
@@ -122,7 +127,7 @@ def test_what_a_campaign_lists_runs_beside_the_methods():
 def test_sections_of_cases_go_before_the_top_level():
     sections = [{"name": "short", "duration": 4}, {"name": "other", "turbine": "t2b1i1cg"}]
     sets, _ = load({**SMALL, "cases": sections})
-    assert [(c.name, c.duration, c.turbine.name) for c in sets] == [
+    assert [(c.name, c.duration, c.ensemble.turbine.name) for c in sets] == [
         ("short", 4, "nrel5mw"),
         ("other", 8, "t2b1i1cg"),
     ]
@@ -166,9 +171,9 @@ def test_an_unstable_combination_says_when_it_diverged_and_has_no_errors(result)
     lost = next(p for p in part["points"] if (p.method, p.step) == ("heun", 0.15))
     assert lost.diverged == 2 and 0 < lost.diverged_at < 8
     assert lost.nrmse_max is None and lost.del_error_max is None and not lost.wall
-    said = "\n".join(text.cases(part))
+    said = page.section(part)
     assert "Diverged (first time), never on a front: heun 150 ms" in said
-    assert "2 diverged, first at" in "\n".join(text.points(part))
+    assert "2 diverged, first at" in table(tables.points(part["points"]))
 
 
 def test_errors_of_the_others_are_complete(result):
@@ -192,12 +197,12 @@ def test_the_reference_is_measured_against_another_method_and_step(result):
     assert {c["method"] for c in checks} == {"dop853", "rk7"} and len({c["step"] for c in checks}) == 2
     # its own error is far below the errors that anybody asks for
     assert max(c["nrmse_worst"] for c in checks) < 1e-7 and max(c["del_error_max"] for c in checks) < 1e-7
-    assert "agree with it to an NRMSE of" in text.trust(part)
+    assert "agree with it to an NRMSE of" in words.trust(part)
 
 
 def test_a_reference_that_diverges_is_refused():
     with pytest.raises(InputError, match="the reference heun at 100 ms diverges"):
-        page.measure({**SMALL, "reference": {"method": "heun", "step": 0.1}}, workers=1, timed=False)
+        run.measure({**SMALL, "reference": {"method": "heun", "step": 0.1}}, workers=1, timed=False)
 
 
 def test_adaptive_methods_come_closer_with_their_tolerance(result):
@@ -210,10 +215,10 @@ def test_adaptive_methods_come_closer_with_their_tolerance(result):
 
 def test_timed_runs_are_as_long_as_they_need_to_be():
     c, settings = load(SMALL)[0][0], Settings(timed_evaluations=4000.0)
-    assert entries.timed_duration(c, settings, 20.0) == pytest.approx(8.0)  # never longer than the cases
+    assert integrators.timed_duration(c, settings, 20.0) == pytest.approx(8.0)  # never longer than the cases
     long = load({**SMALL, "duration": 100})[0][0]
-    assert entries.timed_duration(long, settings, 100.0) == pytest.approx(40.0)
-    assert entries.timed_duration(long, settings, 1000.0) == pytest.approx(10.0)
+    assert integrators.timed_duration(long, settings, 100.0) == pytest.approx(40.0)
+    assert integrators.timed_duration(long, settings, 1000.0) == pytest.approx(10.0)
 
 
 def test_times_are_of_every_point_that_did_not_diverge_and_leave_the_errors_alone(result):
@@ -242,19 +247,18 @@ def test_the_pages_hold_the_answers_the_tables_and_the_figures(timed, tmp_path):
     whole = {**timed, "rounds": 1, "load_average": 0.0}
     written = page.write(whole, tmp_path, tmp_path / "images").read_text(encoding="utf-8")
     part = timed["cases"][0]
-    for line in text.verdicts(part):
-        assert line in written
-    assert "| NRMSE 1e-03 |" in written and "missed" in written
+    assert table(tables.verdicts(part, "wall")) in written
+    assert "| NRMSE 1e-03 |" in written
     for line in written.splitlines():
         if line.startswith("!["):
             assert (tmp_path / line.split("(")[1].rstrip(")")).stat().st_size > 5000
-    tables = (tmp_path / "work-precision-tables.md").read_text(encoding="utf-8")
-    assert all(p.label in tables for p in part["points"])
-    assert "tower_base_fore_aft_moment" in tables and "rotor_speed" in tables
+    all_points = (tmp_path / "work-precision-tables.md").read_text(encoding="utf-8")
+    assert all(p.label in all_points for p in part["points"])
+    assert "tower_base_fore_aft_moment" in all_points and "rotor_speed" in all_points
 
 
 def test_json_holds_every_point_with_plain_values(monkeypatch, tmp_path, timed):
-    monkeypatch.setattr(page, "measure", lambda *arguments, **named: timed)
+    monkeypatch.setattr(run, "measure", lambda *arguments, **named: timed)
     file = tmp_path / "figures.json"
     done = CliRunner().invoke(app, ["work-precision", "--json", str(file)])
     assert done.exit_code == 0 and "Pareto fronts" in done.output
@@ -266,7 +270,7 @@ def test_json_holds_every_point_with_plain_values(monkeypatch, tmp_path, timed):
 
 
 def test_a_folder_that_cannot_be_written_is_said_in_one_sentence(monkeypatch, tmp_path, timed):
-    monkeypatch.setattr(page, "measure", lambda *arguments, **named: timed)
+    monkeypatch.setattr(run, "measure", lambda *arguments, **named: timed)
     (tmp_path / "file").write_text("")
     done = CliRunner().invoke(app, ["work-precision", "--out", str(tmp_path / "file")])
     assert isinstance(done.exception, InputError) and "give --out another folder" in str(done.exception)
@@ -280,34 +284,35 @@ def test_a_file_that_is_no_earlier_run_is_refused(tmp_path):
 
 
 def test_stability_counts_what_diverges_over_seeds_that_are_kept_for_benchmarks():
-    from fatigue_runner.benchmark import stability
+    from fatigue_runner.benchmark.study import stability
 
     chosen = [c for c in correctors() if c.name == "rk4-100ms"]
     found = stability.measure(2, 4.0, chosen=chosen)
     row = found["rows"][0]
     assert row["enhanced"]["diverged"] == row["hybrid"]["diverged"] == 0 and row["accepted"] > 0.9
-    assert "| rk4-100ms | 0 | 0 |" in "\n".join(stability.text(found))
+    assert "| rk4-100ms | 0 | 0 |" in page.speed("stability", found)
     with pytest.raises(InputError, match="seeds are kept"):
         stability.measure(10_000, 4.0)
 
 
 def test_operations_are_counted_without_the_index_arithmetic():
-    from fatigue_runner.benchmark.kernel import operations
+    from fatigue_runner.benchmark.speed.kernel import operations
 
     # counted by hand: about 1,150 packed instructions, most of them fused, and 24 cubics
     assert 1500 < operations() < 2500
 
 
-def test_an_entry_with_a_corrector_has_a_curve_of_its_own():
+def test_an_integrator_with_a_corrector_has_a_curve_of_its_own():
     found = next(c for c in correctors() if c.name == "rk4-100ms")
-    assert Entry("rk4", 0.1).series == "rk4"
-    assert Entry("rk4", 0.1, found, "hybrid").series == "rk4 + affine, hybrid"
-    assert Entry("rk4", 0.1, found, "hybrid").label == "rk4-100ms, hybrid"
+    assert integrators.series(Integrator("rk4", 0.1)) == "rk4"
+    corrected = Integrator("rk4", 0.1, found, "hybrid")
+    assert integrators.series(corrected) == "rk4 + affine, hybrid"
+    assert integrators.kind(corrected) == "hybrid" and integrators.kind(Integrator("rk4", 0.1)) == "classical"
 
 
 @pytest.mark.slow
 def test_the_kernel_benchmark_finds_packed_code_faster_than_scalar_code():
-    from fatigue_runner.benchmark import kernel
+    from fatigue_runner.benchmark.speed import kernel
 
     found = kernel.measure(repeats=3)
     assert all(r["ratio"] > 1.5 for r in found["cases"] if r["cases"] >= 16)
@@ -318,7 +323,7 @@ def test_the_kernel_benchmark_finds_packed_code_faster_than_scalar_code():
 
 @pytest.mark.slow
 def test_the_shipped_benchmark_runs_through_and_places_every_corrector(tmp_path):
-    found = page.measure(rounds=1)
+    found = run.measure(rounds=1)
     page.write(found, tmp_path, tmp_path / "images")
     for part in found["cases"]:
         assert {p.method for p in part["points"] if not p.corrected} == set(METHODS)

@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.benchmark.entries import ADAPTIVE, CLASSICAL, ENHANCED, HYBRID
-from fatigue_runner.benchmark.points import Point
+from fatigue_runner.benchmark.study.integrators import ADAPTIVE, CLASSICAL
+from fatigue_runner.benchmark.study.points import Point
+from fatigue_runner.integrators import ENHANCED, HYBRID
 
 NRMSE_LEVELS = (1e-2, 1e-3, 1e-4, 1e-5)
 DEL_LEVELS = (1e-2, 1e-3)
@@ -175,26 +176,6 @@ def answers(result: dict[str, Any], cost: str, with_exponential: bool = True) ->
     return out
 
 
-def in_words(answer: Answer) -> str:
-    """One sentence."""
-    c, n, ratio = answer.classical, answer.corrected, answer.ratio
-    if c is None and n is None:
-        return f"{answer.target}: no integrator gets there."
-    if c is None or n is None:
-        one, other = (c or n), "corrected" if n is None else "classical"
-        assert one is not None
-        return f"{answer.target}: {_said(one)}; no {other} one gets there."
-    assert ratio is not None
-    verdict = f"{ratio:.2f} times cheaper" if ratio >= 1 else f"{1 / ratio:.2f} times dearer"
-    return f"{answer.target}: classical {_said(c)}; corrected {_said(n)}, {verdict}."
-
-
-def _said(r: Reached) -> str:
-    time = "" if r.wall is None or r.kind == ADAPTIVE else f"{r.wall * 1e6:.3g} µs and "
-    about = "about " if len(r.between) > 1 else ""
-    return f"{r.series} at {about}{r.step * 1e3:.3g} ms ({time}{r.evaluations:.3g} evaluations per simulated second)"
-
-
 @dataclass(frozen=True)
 class Duel:
     """One corrected point against the cheapest classical curve at the same error; ratios above 1: the corrected one is cheaper."""
@@ -225,15 +206,3 @@ def duels(result: dict[str, Any], error: Error = nrmse) -> list[Duel]:
             rivals[cost] = found[0] if found else None
         out.append(Duel(p, own, rivals))
     return out
-
-
-def summary(result: dict[str, Any]) -> dict[str, Any]:
-    """The answers of one set of cases as plain values."""
-    points = result["points"]
-    return {
-        "front_wall_nrmse": [p.label for p in front(points, wall, nrmse)],
-        "front_evaluations_nrmse": [p.label for p in front(points, evaluations, nrmse)],
-        "front_wall_del_error": [p.label for p in front(points, wall, del_error)],
-        "answers": [a.to_dict() for cost in COSTS for a in answers(result, cost)],
-        "in_words": [in_words(a) for a in answers(result, "wall")],
-    }

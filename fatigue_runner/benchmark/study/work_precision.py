@@ -15,21 +15,20 @@ import hashlib
 import json
 import pickle
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from fatigue_runner.benchmark import adaptive, machine
-from fatigue_runner.benchmark.cases import Cases, Settings
-from fatigue_runner.benchmark.entries import (
-    Entry,
+from fatigue_runner.benchmark.speed import machine
+from fatigue_runner.benchmark.study import adaptive
+from fatigue_runner.benchmark.study.cases import Cases, Settings
+from fatigue_runner.benchmark.study.integrators import (
     fitting,
     limit,
     rungs,
     seconds_per_second,
-    simulate,
     timed_duration,
 )
-from fatigue_runner.benchmark.points import (
+from fatigue_runner.benchmark.study.points import (
     Point,
     Reference,
     evaluate,
@@ -38,13 +37,14 @@ from fatigue_runner.benchmark.points import (
     reference_quality,
 )
 from fatigue_runner.errors import InputError
+from fatigue_runner.integrators import Integrator
 
 Say = Callable[[str], None]
 
 
 @dataclass
 class Job:
-    """A piece of work of the first stage: a method down the steps, or `entries`, or an adaptive method at a tolerance; without
+    """A piece of work of the first stage: a method down the steps, or one `integrator`, or an adaptive method at a tolerance; without
     any of them the reference."""
 
     number: int  # of the set of cases
@@ -52,7 +52,7 @@ class Job:
     settings: Settings
     reference: Reference | None = None
     method: str = ""
-    entries: tuple[Entry, ...] = ()
+    integrator: Integrator | None = None
     tolerance: float = 0.0
 
 
@@ -60,7 +60,7 @@ def run_job(job: Job) -> tuple[Job, dict[str, Any]]:
     """The job without what it was given, and its part of the result."""
     cases = job.cases
     if job.reference is None:
-        reference = make_reference(cases, *cases.reference)
+        reference = make_reference(cases)
         done: dict[str, Any] = {"reference": reference, "agreement": reference_quality(cases, reference)}
     elif job.tolerance:
         count = job.settings.adaptive_cases
@@ -68,13 +68,14 @@ def run_job(job: Job) -> tuple[Job, dict[str, Any]]:
     elif job.method:
         done = descend(cases, job.settings, job.reference, job.method)
     else:
-        done = {"points": [measured(cases, entry, job.reference) for entry in job.entries]}
-    return Job(job.number, cases, job.settings, None, job.method, job.entries, job.tolerance), done
+        assert job.integrator is not None
+        done = {"points": [measured(cases, job.integrator, job.reference)]}
+    return replace(job, reference=None), done
 
 
-def measured(cases: Cases, entry: Entry, reference: Reference) -> Point:
-    block = simulate(cases, entry)
-    return evaluate(block, reference, cases, point_of(entry, cases, block))
+def measured(cases: Cases, integrator: Integrator, reference: Reference) -> Point:
+    block = cases.run(integrator)
+    return evaluate(block, reference, cases, point_of(integrator, cases, block))
 
 
 def descend(cases: Cases, settings: Settings, reference: Reference, method: str) -> dict[str, Any]:
@@ -86,7 +87,7 @@ def descend(cases: Cases, settings: Settings, reference: Reference, method: str)
     steps, reason = rungs(cases, settings, method, largest)
     points = []
     for step in steps:
-        points.append(measured(cases, Entry(method, step), reference))
+        points.append(measured(cases, Integrator(method, step), reference))
         error = points[-1].nrmse_max
         if error is not None and error < settings.finest:
             reason = f"steps below {step * 1e3:g} ms: NRMSE is below {settings.finest:.0e} there"
@@ -115,8 +116,8 @@ def jobs(number: int, cases: Cases, settings: Settings, reference: Reference) ->
             yield Job(*common, method, tolerance=tolerance)
     for method in METHODS if settings.methods is None else settings.methods:
         yield Job(*common, method)
-    for entry in fitting(cases, settings)[0]:
-        yield Job(*common, entries=(entry,))
+    for integrator in fitting(cases, settings)[0]:
+        yield Job(*common, integrator=integrator)
 
 
 def warm_up(sets: Sequence[Cases], settings: Settings) -> None:
@@ -124,9 +125,8 @@ def warm_up(sets: Sequence[Cases], settings: Settings) -> None:
     from fatigue_runner.integrators import METHODS
 
     for cases in sets:
-        entries = [Entry(method, 0.01) for method in METHODS] + fitting(cases, settings)[0]
-        for entry in entries:
-            simulate(cases, entry, max(0.1, 2 * cases.output_step))
+        for integrator in [Integrator(method, 0.01) for method in METHODS] + fitting(cases, settings)[0]:
+            cases.run(integrator, max(0.1, 2 * cases.output_step))
 
 
 def errors(sets: Sequence[Cases], settings: Settings, workers: int, say: Say) -> list[dict[str, Any]]:
@@ -146,7 +146,7 @@ def errors(sets: Sequence[Cases], settings: Settings, workers: int, say: Say) ->
     for count, (job, done) in enumerate(run_jobs(run_job, todo, workers), start=1):
         for key, values in done.items():
             results[job.number][key] += values
-        what = job.method or ", ".join(entry.label for entry in job.entries)
+        what = job.method or (job.integrator.label if job.integrator else "")
         say(
             f"[{count}/{len(todo)}] {job.cases.name}: {what}{f', tolerance {job.tolerance:g}' if job.tolerance else ''}"
         )
@@ -156,16 +156,15 @@ def errors(sets: Sequence[Cases], settings: Settings, workers: int, say: Say) ->
 
 
 def _empty(cases: Cases, settings: Settings) -> dict[str, Any]:
-    method, step = cases.reference
     return {
         "cases": cases.name,
-        "turbine": cases.turbine.name,
+        "turbine": cases.ensemble.turbine.name,
         "turbulent": cases.turbulent,
-        "winds": [w.name for w in cases.winds],
+        "winds": [w.name for w in cases.ensemble.winds],
         "duration": cases.duration,
         "discard": cases.discard,
         "output_rate": 1.0 / cases.output_step,
-        "reference": {"method": method, "step": step, "agreement": []},
+        "reference": {"method": cases.reference.method, "step": cases.reference.step, "agreement": []},
         "points": [],
         "adaptive": [],
         "stability_limits": [],
@@ -192,17 +191,17 @@ def times(
     """Second stage: fills in `wall` of all points that did not diverge."""
     with machine.pinned():
         for cases, result in zip(sets, results, strict=True):
-            correctors = {(e.name, e.mode): e for e in fitting(cases, settings)[0] if e.corrector}
+            corrected = {i.label: i for i in fitting(cases, settings)[0] if i.corrector is not None}
             running = [p for p in result["points"] if not p.diverged]
             work = []
             for p in running:
-                entry = correctors[p.corrector, p.kind] if p.corrector else Entry(p.method, p.step)
-                work.append((entry, timed_duration(cases, settings, p.evaluations_per_second)))
+                integrator = corrected[p.label] if p.corrector else Integrator(p.method, p.step)
+                work.append((integrator, timed_duration(cases, settings, p.evaluations_per_second)))
             walls: list[list[float]] = [[] for _ in work]
             for number in range(-1, rounds):  # one to warm up
                 say(f"{cases.name}: timing, round {number + 1} of {rounds}")
-                for (entry, duration), wall in zip(work, walls, strict=True):
-                    wall.append(seconds_per_second(simulate(cases, entry, duration), duration))
+                for (integrator, duration), wall in zip(work, walls, strict=True):
+                    wall.append(seconds_per_second(cases.run(integrator, duration), duration))
             for p, wall in zip(running, walls, strict=True):
                 p.wall = machine.spread(wall[1:])
 
@@ -214,19 +213,19 @@ def identity(sets: Sequence[Cases], settings: Settings) -> str:
     digest = hashlib.sha256(code_hash().encode())
     digest.update(json.dumps(settings.model_dump(), sort_keys=True).encode())
     for cases in sets:
+        ensemble, integrators = cases.ensemble, [cases.reference, *fitting(cases, settings)[0]]
         values = (
-            cases.turbine.hash,
-            [w.label for w in cases.winds],
-            cases.duration,
-            cases.output_step,
+            ensemble.turbine.hash,
+            [w.label for w in ensemble.winds],
+            ensemble.duration,
+            ensemble.output_step,
             cases.discard,
+            [i.id for i in integrators],
         )
-        digest.update(
-            json.dumps([cases.name, cases.reference, cases.integrators, *values], sort_keys=True).encode()
-        )
-        for entry in fitting(cases, settings)[0]:
-            if entry.corrector is not None:
-                digest.update(entry.label.encode() + pickle.dumps(entry.corrector))
+        digest.update(json.dumps([cases.name, *values], sort_keys=True).encode())
+        for integrator in integrators:
+            if integrator.corrector is not None:
+                digest.update(pickle.dumps(integrator.corrector))
     return digest.hexdigest()[:16]
 
 

@@ -6,14 +6,14 @@ Times are CPU times of one pinned thread: the wall time on an idle machine, and 
 from __future__ import annotations
 
 import ast
-import inspect
 import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from fatigue_runner.benchmark import machine
+from fatigue_runner.benchmark.speed import machine, right_hand_side
+from fatigue_runner.turbine.lanes import LANES
 
 CASES = (1, 8, 16, 64, 256)
 STEP_METHODS = ("heun", "rk3", "rk4", "tsit5", "dop853", "ab4", "abm4", "etdrk4", "etdabm3")
@@ -22,11 +22,9 @@ LOOKUP_OPERATIONS = 6  # of one cubic: three multiplications and three additions
 
 def operations() -> int:
     """Floating-point operations of one evaluation for one case, counted in the kernel's source; a division or root is one."""
-    from fatigue_runner.turbine.generated import kernel
-
     counter = _Operations()
-    counter.visit(ast.parse(kernel.RHS_CODE.text))
-    return counter.count + LOOKUP_OPERATIONS * kernel.EQUATION_TABLES
+    counter.visit(ast.parse(right_hand_side.source()))
+    return counter.count + LOOKUP_OPERATIONS * right_hand_side.look_ups()
 
 
 class _Operations(ast.NodeVisitor):
@@ -47,31 +45,6 @@ class _Operations(ast.NodeVisitor):
         self.generic_visit(node)
 
 
-def scalar_kernel() -> Callable[..., None]:
-    """The right-hand side of the same generated source, built for one lane; its look-up remains SIMD across tables."""
-    from fatigue_runner.turbine.generated import kernel
-
-    source = inspect.getsource(kernel).replace(f"LANES = {kernel.LANES}\n", "LANES = 1\n", 1)
-    # without a file there is nothing to cache: it is compiled anew in every benchmark
-    source = source.replace("from fatigue_runner.compiled import INLINE, njit", "from numba import njit")
-    from fatigue_runner.compiled import INLINE
-
-    space: dict[str, Any] = {"INLINE": INLINE, "__name__": "scalar_kernel"}
-    exec(compile(source, "<scalar kernel>", "exec"), space)
-    return space["rhs"]
-
-
-def _loop(rhs: Callable[..., None]) -> Callable[..., None]:
-    import numba
-
-    @numba.njit(nogil=True)
-    def run(repeats, x, wind, out, tables, cells, constants, scratch, row, clamped):
-        for _ in range(repeats):
-            rhs(x, wind, out, 0, tables, cells, constants, scratch, row, clamped)
-
-    return run
-
-
 def _work(
     run: Callable[..., None], turbine: Any, cases: int, lanes: int, pitched: bool = False
 ) -> Callable[[], float]:
@@ -79,10 +52,6 @@ def _work(
 
     pitched: every case has a pitch of its own, 0 to 8 degrees.
     """
-    from fatigue_runner.integrators.block import aligned
-
-    data = turbine.pitched_kernel_data() if pitched else turbine.kernel_data(0.0)
-    tables = data.tables if pitched else aligned(data.tables)
     groups = -(-cases // lanes)
     speeds = np.linspace(5.0, 10.0, 16)
     points = [turbine.operating_point(v) for v in speeds]
@@ -92,12 +61,7 @@ def _work(
         x[i // lanes, :, i % lanes] = points[i % 16]
         wind[i // lanes, 0, i % lanes] = speeds[i % 16]
         wind[i // lanes, 3:, i % lanes] = np.radians(i % 16 / 2)
-    flat, p = x.reshape(groups, -1), wind.reshape(groups, -1)
-    arguments = [
-        (aligned(flat[g]), aligned(p[g]), aligned(np.zeros(16 * lanes)), tables, data.cells, aligned(data.constants),
-         np.zeros(1), np.zeros(1), np.zeros(lanes, np.int64))
-        for g in range(min(groups, 16))
-    ]  # fmt: skip
+    arguments = right_hand_side.arguments(turbine, x[:16], wind[:16], pitched)
     repeats = max(1, 16000 // groups // max(1, lanes // 2))
 
     def once() -> float:
@@ -107,6 +71,11 @@ def _work(
         return (time.thread_time() - begin) / repeats / cases * 1e9
 
     return once
+
+
+def one_evaluation(turbine: Any, cases: int = CASES[-1]) -> Callable[[], float]:
+    """A piece of work that returns nanoseconds per evaluation and case of the packed kernel."""
+    return _work(right_hand_side.packed(), turbine, cases, LANES)
 
 
 def peak() -> Callable[[], float]:
@@ -154,14 +123,15 @@ def peak() -> Callable[[], float]:
 
 def _step_work(turbine: Any, method: str, step: float = 0.01, duration: float = 4.0) -> Callable[[], float]:
     """A whole simulation of 16 turbulent cases logged at 50 Hz: nanoseconds per evaluation and case, everything included."""
-    from fatigue_runner.integrators import simulate_block
+    from fatigue_runner.integrators import Ensemble, Integrator, simulate
     from fatigue_runner.wind import TurbulentWind
 
     winds = [TurbulentWind(8.0, intensity=0.14, seed=seed, duration=duration) for seed in range(16)]
     initial = np.repeat(turbine.operating_point(8.0)[None], 16, axis=0)
+    ensemble, integrator = Ensemble(turbine, winds, initial, duration, 0.02), Integrator(method, step)
 
     def once() -> float:
-        block = simulate_block(turbine, method, step, winds, initial, duration, 0.02)
+        block = simulate(ensemble, integrator)
         return sum(t.wall_time for t in block) / sum(t.evaluations for t in block) * 1e9
 
     return once
@@ -169,14 +139,13 @@ def _step_work(turbine: Any, method: str, step: float = 0.01, duration: float = 
 
 def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     """All figures of `fatigue-runner benchmark kernel` as plain values; times in ns per evaluation and case."""
-    from fatigue_runner.turbine import load_turbine, model
-    from fatigue_runner.turbine.generated import kernel
+    from fatigue_runner.turbine import load_turbine
 
     turbine = load_turbine(turbine_name)
-    packed, scalar = _loop(kernel.rhs), _loop(scalar_kernel())
-    work = {f"packed {n}": _work(packed, turbine, n, kernel.LANES) for n in CASES}
+    packed, scalar = right_hand_side.packed(), right_hand_side.scalar()
+    work = {f"packed {n}": _work(packed, turbine, n, LANES) for n in CASES}
     work |= {f"scalar {n}": _work(scalar, turbine, n, 1) for n in CASES}
-    work["pitched"] = _work(_loop(model.rhs), turbine, CASES[-1], kernel.LANES, pitched=True)
+    work["pitched"] = _work(right_hand_side.pitched(), turbine, CASES[-1], LANES, pitched=True)
     work |= {f"step {name}": _step_work(turbine, name) for name in STEP_METHODS}
     work["peak"] = peak()
     with machine.pinned():
@@ -202,7 +171,7 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     ]
     return {
         "machine": machine.describe(),
-        "lanes": kernel.LANES,
+        "lanes": LANES,
         "turbine": turbine.name,
         "operations_per_evaluation": flops,
         "peak_flop_per_ns": rate,

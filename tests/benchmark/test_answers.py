@@ -1,27 +1,16 @@
-"""The benchmark's answers have known answers: fronts, costs read from curves, targets, all on points made by hand."""
+"""The benchmark's answers have known answers: fronts and costs read from curves, all on points made by hand."""
 
 from __future__ import annotations
 
 import math
 
 import pytest
+from benchmark_points import point, result
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fatigue_runner.benchmark import answers, targets
-from fatigue_runner.benchmark.points import Point
-
-
-def point(series, step, cost, error, kind="classical", **others):
-    """cost: microseconds and evaluations per simulated second alike."""
-    corrector = f"{series}-{step}" if kind in ("enhanced", "hybrid") else ""
-    label = f"{series} {step * 1e3:g} ms"
-    values = {"wall": {"median": cost * 1e-6}, "nrmse_max": error, "del_error_max": error, **others}
-    return Point("x", series.split(" ")[0], step, cost, series, label, kind, corrector, **values)
-
-
-def result(points, turbulent=True, **others):
-    return {"points": points, "adaptive": [], "turbulent": turbulent, "turbine": "nrel5mw", **others}
+from fatigue_runner.benchmark.pages import words
+from fatigue_runner.benchmark.study import answers
 
 
 def test_the_front_holds_the_points_that_none_beats_and_none_that_diverged():
@@ -111,14 +100,14 @@ def test_classical_and_corrected_ones_are_named_with_the_ratio_of_their_costs():
     assert best.classical.series == "a" and best.corrected.series == "a + affine, enhanced"
     # a: 10 to 1000 µs over four decades of error, so 10^1.5 at a quarter of them
     assert best.ratio == pytest.approx(10**1.5 / 8)
-    assert "times cheaper" in answers.in_words(best)
+    assert "times cheaper" in words.in_words(best)
     assert at["NRMSE 1e-05"].corrected is None and at["NRMSE 1e-05"].ratio is None
-    assert "no corrected one gets there" in answers.in_words(at["NRMSE 1e-05"])
+    assert "no corrected one gets there" in words.in_words(at["NRMSE 1e-05"])
 
 
 def test_a_corrector_that_loses_is_said_to_be_dearer():
     found = result([point("a", 0.1, 10, 1e-4), point("a + affine, enhanced", 0.1, 20, 1e-4, "enhanced")])
-    said = answers.in_words(answers.answers(found, "wall")[0])
+    said = words.in_words(answers.answers(found, "wall")[0])
     assert said.endswith("2.00 times dearer.")
 
 
@@ -147,26 +136,3 @@ def test_exponential_methods_can_be_left_out_of_the_comparison_and_their_correct
     ])  # fmt: skip
     ratios = [answers.answers(found, "wall", with_exponential=w)[1].ratio for w in (True, False)]
     assert ratios == [pytest.approx(10 / 8), pytest.approx(40 / 8)]
-
-
-def learned(step, cost, error, **others):
-    return point("rk4 + affine, enhanced", step, cost, error, "enhanced", **others)
-
-
-def test_targets_say_reached_or_missed():
-    plain = [point("a", 0.1, 40, 1e-2), point("a", 0.05, 400, 1e-5)]
-    good = result([*plain, learned(0.1, 20, 5e-5)])
-    found = targets.targets(good)
-    # at 1e-3 the classical curve costs 40 * 10^(1/3), at 1e-4 40 * 10^(2/3)
-    assert [round(float(t.found.split(" ")[0]), 2) for t in found[:2]] == [4.31, 9.28]
-    assert all(t.reached for t in found) and "moonshot" not in found[0].found and "moonshot" in found[1].found
-    bad = result([*plain, learned(0.1, 90, 5e-5)])
-    assert [t.reached for t in targets.targets(bad)] == [False, False, False, False, False]
-    assert str(targets.targets(bad)[0]).startswith("**missed**: 3 times less time")
-
-
-def test_the_papers_target_is_judged_on_the_papers_turbine_only():
-    p = point("heun + affine, enhanced", 0.01, 200, 1e-6, "enhanced", delta_e_range=[1e-11, 1e-12, 1e-9])
-    assert targets.targets(result([p], turbulent=False)) == []
-    judged = targets.targets(result([p], turbulent=False) | {"turbine": "t2b1i1cg"})
-    assert [t.reached for t in judged] == [True] and "1.0e-11" in judged[0].found

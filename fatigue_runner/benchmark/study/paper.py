@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner import shipped
-from fatigue_runner.benchmark import machine
-from fatigue_runner.benchmark.cases import Cases, load
-from fatigue_runner.benchmark.entries import ENHANCED, HYBRID, Entry, simulate
-from fatigue_runner.benchmark.targets import Target
-from fatigue_runner.benchmark.text import table
+from fatigue_runner.benchmark.speed import machine
+from fatigue_runner.benchmark.study.cases import Cases, load
+from fatigue_runner.benchmark.study.integrators import series
+from fatigue_runner.integrators import ENHANCED, HYBRID, MODES, Integrator
 
-COMMAND = "fatigue-runner benchmark paper --out docs"
 TURBINE = "t2b1i1cg"
 CLASSICAL = ("heun", "rk3", "heun-richardson")
 STEPS = (
@@ -61,30 +59,34 @@ class Outcome:
         return np.array([v for v, k in zip(found, keep, strict=True) if k and v is not None])
 
 
-def entries(correctors: Sequence[Any], steps: Sequence[float] = STEPS) -> list[Entry]:
+def compared(correctors: Sequence[Any], steps: Sequence[float] = STEPS) -> list[Integrator]:
     """The classical methods at all steps, and every corrector in both modes at its own step."""
-    plain = [Entry(method, step) for method in CLASSICAL for step in steps]
-    return plain + [Entry(c.method, c.step, c, mode) for c in correctors for mode in (ENHANCED, HYBRID)]
+    plain = [Integrator(method, step) for method in CLASSICAL for step in steps]
+    return plain + [Integrator(c.method, c.step, c, mode) for c in correctors for mode in MODES]
 
 
 def speeds(cases: Cases) -> list[float]:
-    return [float(w.mean_speed) for w in cases.winds]
+    return [float(w.mean_speed) for w in cases.ensemble.winds]
 
 
-def outcome(cases: Cases, entry: Entry, reference: Sequence[Any], repeats: int = REPEATS) -> Outcome:
+def outcome(
+    cases: Cases, integrator: Integrator, reference: Sequence[Any], repeats: int = REPEATS
+) -> Outcome:
     """Errors against the reference; of the time, the least of the repeats: other work of the machine only adds to it. Runs of steps
     below a millisecond are long enough to be timed once."""
     from fatigue_runner.accuracy import compare
 
-    runs = simulate(cases, entry)
+    runs = cases.run(integrator)
     walls = [sum(r.wall_time for r in runs)]
     walls += [
-        sum(r.wall_time for r in simulate(cases, entry))
-        for _ in range(repeats - 1 if entry.step >= 1e-3 else 0)
+        sum(r.wall_time for r in cases.run(integrator))
+        for _ in range(repeats - 1 if integrator.step >= 1e-3 else 0)
     ]
     seconds = len(runs) * cases.duration
     evaluations = sum(r.evaluations for r in runs) / seconds
-    out = Outcome(entry.series, entry.method, entry.step, entry.mode, evaluations, min(walls) / seconds)
+    out = Outcome(
+        series(integrator), integrator.method, integrator.step, integrator.corrected_mode, evaluations, min(walls) / seconds
+    )  # fmt: skip
     for run, exact in zip(runs, reference, strict=True):
         found = compare(run, exact) if run.diverged_at is None else None
         for name in ERRORS:
@@ -102,15 +104,15 @@ def measure(
     """All integrators on a campaign's winds: {name, turbine, speeds, reference, outcomes}. Raises InputError for a corrector that
     does not fit the campaign's turbine."""
     cases = load(campaign)[0][0]
-    reference = simulate(cases, Entry(*REFERENCE))
+    reference = cases.run(Integrator(*REFERENCE))
     outcomes = []
     with machine.pinned():
-        for entry in entries(correctors, steps):
-            say(f"{cases.name}: {entry.series}, {entry.step * 1e3:g} ms")
-            outcomes.append(outcome(cases, entry, reference))
+        for integrator in compared(correctors, steps):
+            say(f"{cases.name}: {integrator.label}")
+            outcomes.append(outcome(cases, integrator, reference))
     return {
         "name": cases.name,
-        "turbine": cases.turbine.name,
+        "turbine": cases.ensemble.turbine.name,
         "speeds": speeds(cases),
         "reference": {"method": REFERENCE[0], "step": REFERENCE[1]},
         "outcomes": outcomes,
@@ -185,44 +187,19 @@ def at_equal_cost(measured: dict[str, Any], outcome: Outcome) -> float | None:
     return float(np.exp(np.interp(np.log(outcome.evaluations), np.log(costs), np.log(errors))))
 
 
-def text(measured: dict[str, Any]) -> list[str]:
-    """A Markdown table of the boxed steps: medians over the winds, the worst wind in brackets."""
-    speeds = measured["speeds"]
-    cells = []
-    for o, r in zip(measured["outcomes"], rows(measured), strict=True):
-        if o.step not in BOXED:
-            continue
-        worse, rival = worse_than_rk3(measured, o), at_equal_cost(measured, o)
-        cells.append([
-            o.label, f"{o.step * 1e3:g}", f"{o.evaluations:.0f}", f"{o.wall * 1e6:.0f}",
-            *(f"{r[n]['median']:.1e} ({r[n]['worst']:.1e})" if n in r else "" for n in ("nrmse_max", "delta_e_range")),
-            f"{r['delta_e']['median']:.1e}" if "delta_e" in r else "", r["diverged"] or "",
-            f"{r['accepted'] * 100:.1f} %" if o.mode == HYBRID else "",
-            "" if worse is None else f"{worse[0]} (at most {worse[1]:.3g} times)",
-            "" if rival is None or not o.mode else f"{rival:.1e}",
-        ])  # fmt: skip
-    head = [
-        *(
-            "integrator",
-            "step [ms]",
-            "f per s",
-            "µs/s",
-            "NRMSE",
-            "delta_e_range",
-            "delta_e",
-            "diverged",
-            "accepted",
-        ),
-        *("winds > 1 % worse than RK3 at that step", "RK3's delta_e_range at as many evaluations"),
-    ]
-    return [
-        f"## {measured['name']}: {len(speeds)} winds in {min(speeds):.0f} to {max(speeds):.0f} m/s on `{measured['turbine']}`",
-        "",
-        *table(head, cells),
-    ]
+@dataclass(frozen=True)
+class Claim:
+    """What was claimed or asked, what was found, whether that is enough."""
+
+    asked: str
+    found: str
+    reached: bool
+
+    def __str__(self) -> str:
+        return f"{'reached' if self.reached else '**missed**'}: {self.asked}: {self.found}"
 
 
-def judged(inside: dict[str, Any], outside: dict[str, Any]) -> list[Target]:
+def claims(inside: dict[str, Any], outside: dict[str, Any]) -> list[Claim]:
     """The paper's claims, per corrector: closer than RK3 at equal evaluations in range, a hybrid nowhere worse than RK3 at its step."""
     found = []
     for o in inside["outcomes"]:
@@ -230,49 +207,14 @@ def judged(inside: dict[str, Any], outside: dict[str, Any]) -> list[Target]:
         if o.mode == ENHANCED and rival is not None:
             own = float(np.median(o.values("delta_e_range")))
             asked = f"{o.label.removesuffix(', enhanced')} at {o.step * 1e3:g} ms closer than RK3 at as many evaluations, in range"
-            found.append(Target(asked, f"{own:.1e} against {rival:.1e}", own < rival))
+            found.append(Claim(asked, f"{own:.1e} against {rival:.1e}", own < rival))
     for o in outside["outcomes"]:
         worse = worse_than_rk3(outside, o)
         if o.mode == HYBRID and worse is not None:
             asked = f"{o.label} at {o.step * 1e3:g} ms on no wind up to 20 m/s more than 1 % further off than RK3 at the same step"
             said = f"{worse[0]} of {len(o.delta_e_range)} winds, RMS error at most {worse[1]:.3g} times RK3's"
-            found.append(Target(asked, said, worse[0] == 0))
+            found.append(Claim(asked, said, worse[0] == 0))
     return found
-
-
-def page(inside: dict[str, Any], outside: dict[str, Any], folder: Path) -> Path:
-    """`work-precision-paper.md` in `folder`, the figures in `folder/images`; the page's path."""
-    from fatigue_runner.benchmark.paper_figures import draw
-
-    figures = draw(inside, outside, folder / "images")
-    method, step = inside["reference"]["method"], inside["reference"]["step"]
-    lines = [
-        "# The paper's experiment, measured",
-        "",
-        f"Made by `{COMMAND}`. {machine_words()}. The winds, initial state and turbine of arXiv:2504.05493 as far as it lists them "
-        f"(`campaigns/paper_*.yaml`); reference {method} at {step * 1e3:g} ms. Medians over the winds, the worst wind in brackets; µs/s: "
-        "CPU time of one pinned thread per simulated second and case, the least of three. What the figures mean: "
-        "[paper-corrector.md](paper-corrector.md).",
-        "",
-        *[f"- {t}" for t in judged(inside, outside)],
-        "",
-        *[f"![{f.stem}](images/{f.name})\n" for f in figures],
-        "Boxes: quartiles and median over the winds, whiskers to the least and the largest; δ_e,range, then δ_e as the paper writes "
-        "it, which divides by |x| and is ruled by zero crossings.",
-        "",
-        *text(inside),
-        "",
-        *text(outside),
-    ]
-    path = folder / "work-precision-paper.md"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
-
-
-def machine_words() -> str:
-    from fatigue_runner.benchmark.text import machine as words
-
-    return words(machine.describe())
 
 
 def to_json(measured: dict[str, Any]) -> dict[str, Any]:

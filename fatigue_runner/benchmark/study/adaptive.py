@@ -7,21 +7,18 @@ times the cost of f for one case alone, which no adaptive code can beat: cases w
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fatigue_runner.benchmark.cases import Cases
-from fatigue_runner.benchmark.entries import ADAPTIVE
-from fatigue_runner.benchmark.points import Point, Reference, evaluate
-from fatigue_runner.compiled import njit
-from fatigue_runner.integrators.stepping import wind_at
-from fatigue_runner.turbine.generated import kernel
-from fatigue_runner.turbine.lanes import LANES, to_groups, work_space
+from fatigue_runner.benchmark.speed import right_hand_side
+from fatigue_runner.benchmark.study.cases import Cases
+from fatigue_runner.benchmark.study.integrators import ADAPTIVE
+from fatigue_runner.benchmark.study.points import Point, Reference, evaluate
+from fatigue_runner.integrators import Integrator, simulate
 
-_rhs = kernel.rhs
 METHODS = ("dop853-adaptive", "tsit5-adaptive")
 # Absolute tolerance of a state as a fraction of its range: the states differ by four orders of magnitude.
 ABSOLUTE = 1.0
@@ -44,34 +41,6 @@ class Solved:
         return float(self.time[-1] - self.time[0])
 
 
-@njit(nogil=True)
-def _slope(t, x, wind, work, model):
-    """f(t, x) (16,) of one case: the same state in every lane, the first one read."""
-    cell_duration, block = wind
-    state, p, slope, clamped = work
-    tables, count, constants, scratch, row = model
-    for i in range(16):
-        for j in range(LANES):
-            state[i * LANES + j] = x[i]
-    wind_at(t, cell_duration, block, p)
-    _rhs(state, p, slope, 0, tables, count, constants, scratch, row, clamped)
-    out = np.empty(16)
-    for i in range(16):
-        out[i] = slope[i * LANES]
-    return out
-
-
-def right_hand_side(cases: Cases, wind: Any, duration: float) -> Callable[[float, np.ndarray], np.ndarray]:
-    """f(t, x) of one case, compiled; the lanes beside it are wasted."""
-    data = cases.turbine.kernel_data(cases.pitch)
-    cell_duration, cells = wind.cells(duration)
-    block = to_groups(np.ascontiguousarray(cells.reshape(-1, 1))).reshape(len(cells), 4, -1)
-    scratch, row, clamped = work_space()
-    work = np.zeros(16 * LANES), np.zeros(3 * LANES), np.zeros(16 * LANES), clamped
-    model = data.tables, data.cells, data.constants, scratch, row
-    return lambda t, x: _slope(t, x, (cell_duration, block), work, model)
-
-
 def solver(name: str) -> Any:
     """SciPy's DOP853, or its Runge-Kutta class with this project's Tsit5 tableau."""
     from scipy.integrate import DOP853, RK45
@@ -91,12 +60,7 @@ def solver(name: str) -> Any:
 
 def ranges(cases: Cases, number: int) -> np.ndarray:
     """(16,) extent of every state in a case."""
-    from fatigue_runner.integrators import simulate_block
-
-    found = simulate_block(
-        cases.turbine, "rk4", 0.02, [cases.winds[number]], cases.initial[number : number + 1], cases.duration,
-        cases.output_step, pitch=cases.pitch,
-    )[0]  # fmt: skip
+    found = simulate(cases.ensemble.part([number]), Integrator("rk4", 0.02))[0]
     return np.ptp(found.state, axis=0)
 
 
@@ -104,14 +68,13 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
     """One whole case at one relative tolerance; outputs between steps by the quintic that the fixed-step methods use."""
     from fatigue_runner.integrators.output import hermite_weights
 
-    wind, duration = cases.winds[number], cases.duration
+    wind, initial, duration = cases.ensemble.winds[number], cases.ensemble.initial[number], cases.duration
+    turbine = cases.ensemble.turbine
     times = np.arange(round(duration / cases.output_step) + 1) * cases.output_step
-    f = right_hand_side(cases, wind, duration)
+    f = right_hand_side.of_one_case(turbine, wind, duration, cases.pitch)
     scale = ranges(cases, number)
     begin = time.perf_counter()
-    stepper = solver(name)(
-        f, 0.0, cases.initial[number], duration, rtol=tolerance, atol=ABSOLUTE * tolerance * scale
-    )
+    stepper = solver(name)(f, 0.0, initial, duration, rtol=tolerance, atol=ABSOLUTE * tolerance * scale)
     states, filled = np.empty((len(times), 16)), 1
     states[0] = stepper.y
     old, old_slope = stepper.y.copy(), stepper.f.copy()
@@ -135,14 +98,14 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
         old, old_slope = stepper.y.copy(), stepper.f.copy()
     seconds = time.perf_counter() - begin
     signals = wind.at(times)
-    loads = cases.turbine.loads(states, signals, cases.pitch)
+    loads = turbine.loads(states, signals, cases.pitch)
     failed = stepper.t if stepper.status == "failed" else None
     return Solved(times, states, signals, loads, stepper.nfev, seconds, failed)
 
 
 def measure(cases: Cases, reference: Reference, name: str, tolerance: float, count: int) -> Point:
     """The point of an adaptive method on `count` of the cases; `step` is the mean step [s]."""
-    chosen = list(range(0, len(cases.winds), max(1, len(cases.winds) // count)))[:count]
+    chosen = list(range(0, len(cases.ensemble), max(1, len(cases.ensemble) // count)))[:count]
     part = Reference([reference.trajectories[i] for i in chosen], [reference.loads[i] for i in chosen])
     block: Sequence[Any] = [solve(cases, i, name, tolerance) for i in chosen]
     rate = sum(s.evaluations for s in block) / len(block) / cases.duration

@@ -25,9 +25,6 @@ from fatigue_runner.logbook.generic import message_class
 from fatigue_runner.trajectory import Trajectory
 
 TOPICS = ("state", "loads", "status")
-# Steps per second and core that DESIGN and the issue ask of zstd with three topics, and rows per second of
-# reading.
-TARGET = 500_000
 # The one-by-one writers are tens of times slower; a tenth of the rows gives their rate as well.
 _SLOW_SHARE = 10
 # (channel id, topic, schema of the topic, log time [ns], message)
@@ -193,12 +190,11 @@ def _relative(rates: dict[str, float], base: str) -> dict[str, dict[str, float]]
     return {name: {"per_second": rate, "ratio": rate / rates[base]} for name, rate in rates.items()}
 
 
-def benchmark_logs(rows: int = 60_000, repeats: int = 3, folder: str | Path | None = None) -> dict[str, Any]:
+def measure(rows: int = 60_000, repeats: int = 3, folder: str | Path | None = None) -> dict[str, Any]:
     """Rows per second of every writer and reader on one core, and their ratio to the `mcap` library's.
 
     rows: of three topics (43 fields); folder: where the files go, and with it the disk (default: the
-    temporary folder). Returns {"rows", "topics", "bytes_per_row", "target", "met", "writers" and "readers": {name:
-    {"per_second", "ratio"}}}.
+    temporary folder). Returns {"rows", "topics", "bytes_per_row", "writers" and "readers": {name: {"per_second", "ratio"}}}.
     """
     with tempfile.TemporaryDirectory(dir=folder) as made:
         where = Path(made)
@@ -207,33 +203,10 @@ def benchmark_logs(rows: int = 60_000, repeats: int = 3, folder: str | Path | No
         (where / "read").mkdir()
         writers = dict(_write_rates(where / "write", rows, repeats))
         readers = dict(_read_rates(where / "read", rows, repeats))
-    ours = "fatigue-runner, zstd"
     return {
         "rows": rows,
         "topics": list(TOPICS),
         "bytes_per_row": size / rows,
-        "target": TARGET,
-        "met": min(writers[ours], readers[ours]) >= TARGET,
         "writers": _relative(writers, BASE_WRITER),
         "readers": _relative(readers, BASE_READER),
     }
-
-
-def table(result: dict[str, Any]) -> Any:
-    """The figures of `benchmark_logs` as a rich table."""
-    from rich.table import Table
-
-    made = Table(title=f"Logs: {result['rows']} rows, topics {', '.join(result['topics'])}, one core")
-    made.add_column("")
-    made.add_column("rows per second", justify="right")
-    made.add_column("ratio", justify="right")
-    for title, kind in (("writing", "writers"), ("reading", "readers")):
-        made.add_section()
-        made.add_row(f"[bold]{title}[/]", "", "")
-        for name, figures in sorted(result[kind].items(), key=lambda item: -item[1]["ratio"]):
-            made.add_row(name, f"{figures['per_second']:,.0f}", f"{figures['ratio']:.2f}")
-    made.caption = (
-        f"{result['bytes_per_row']:.0f} bytes per row with zstd; target {result['target']:,} rows per second: "
-        + ("met" if result["met"] else "missed")
-    )
-    return made

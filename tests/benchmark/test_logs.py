@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from logbook_example import differing
 
-from fatigue_runner.benchmark import logs
+from fatigue_runner.benchmark.pages import tables
+from fatigue_runner.benchmark.speed import logs
 from fatigue_runner.logbook import read_log, write_log
 
 
@@ -21,12 +22,10 @@ def test_every_other_writer_writes_the_same_rows(tmp_path, name):
 
 
 def test_benchmark_gives_ratios_to_the_library_of_the_same_run():
-    result = logs.benchmark_logs(rows=100, repeats=1)
+    result = logs.measure(rows=100, repeats=1)
     for kind, base in (("writers", logs.BASE_WRITER), ("readers", logs.BASE_READER)):
         assert result[kind][base]["ratio"] == 1.0
         rate = result[kind]["fatigue-runner, zstd"]["per_second"]
         assert result[kind]["fatigue-runner, zstd"]["ratio"] == rate / result[kind][base]["per_second"]
-    slower = min(result[kind]["fatigue-runner, zstd"]["per_second"] for kind in ("writers", "readers"))
-    assert result["met"] is (slower >= logs.TARGET == 500_000)
     assert result["bytes_per_row"] > 8 * 38, "39 noisy float64 do not compress away"
-    assert logs.table(result).row_count == 2 + len(result["writers"]) + len(result["readers"])
+    assert tables.logs(result).row_count == 2 + len(result["writers"]) + len(result["readers"])

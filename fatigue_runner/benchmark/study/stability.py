@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.benchmark.cases import SEEDS
-from fatigue_runner.benchmark.entries import ENHANCED, HYBRID
-from fatigue_runner.benchmark.text import table
+from fatigue_runner.benchmark.study.cases import SEEDS
 from fatigue_runner.errors import InputError
+from fatigue_runner.integrators import MODES, Ensemble, Integrator, simulate
 
 FIRST_SEED = SEEDS.start + 100  # beyond those of campaigns/work_precision.yaml
 SPEEDS, INTENSITY = (5.0, 10.0), 0.14
@@ -42,45 +41,17 @@ def measure(
         start = np.array([initial_state(turbine, "operating-point", w) for w in winds])
         say(c.name)
         try:
-            rows.append(_row(turbine, c, winds, start, duration))
+            rows.append(_row(Ensemble(turbine, winds, start, duration, min(OUTPUT, duration)), c))
         except InputError as error:  # of another version of the turbine
             rows.append({"corrector": c.name, "refused": str(error)})
     return {"winds": seeds, "duration": duration, "rows": rows}
 
 
-def _row(
-    turbine: Any, corrector: Any, winds: Sequence[Any], start: np.ndarray, duration: float
-) -> dict[str, Any]:
-    from fatigue_runner.integrators import simulate_block
-
+def _row(ensemble: Ensemble, corrector: Any) -> dict[str, Any]:
     row: dict[str, Any] = {"corrector": corrector.name}
-    for mode in (ENHANCED, HYBRID):
-        runs = simulate_block(
-            turbine, corrector.method, corrector.step, winds, start, duration, min(OUTPUT, duration),
-            corrector=corrector, mode=mode,
-        )  # fmt: skip
+    for mode in MODES:
+        runs = simulate(ensemble, Integrator(corrector.method, corrector.step, corrector, mode))
         lost = [r.diverged_at for r in runs if r.diverged_at is not None]
         row[mode] = {"diverged": len(lost), "first": min(lost, default=None)}
     row["accepted"] = float(np.mean([r.accepted.mean() for r in runs]))
     return row
-
-
-def text(result: dict[str, Any]) -> list[str]:
-    """A Markdown table."""
-
-    def lost(value: dict[str, Any]) -> str:
-        return f"{value['diverged']}" + (f", first at {value['first']:.1f} s" if value["diverged"] else "")
-
-    cells = [
-        [r["corrector"], lost(r[ENHANCED]), lost(r[HYBRID]), f"{r['accepted'] * 100:.2f} %"]
-        for r in result["rows"]
-        if "refused" not in r
-    ]
-    head = ["corrector", "enhanced diverged", "hybrid diverged", "hybrid accepted"]
-    what = f"{result['winds']} unseen turbulent winds of {result['duration']:g} s each:"
-    return [
-        what,
-        "",
-        *table(head, cells),
-        *(f"\nrefused: {r['refused']}" for r in result["rows"] if "refused" in r),
-    ]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.benchmark import machine
+from fatigue_runner.benchmark.speed import kernel, machine
 
 SIZES = (17, 111, 111, 111, 16)  # arXiv:2504.05493
 SAMPLES = (1, 16, 64, 256, 1024)
@@ -44,18 +44,14 @@ def _work(samples: int, kind: Any) -> Callable[[], float]:
 
 def measure(repeats: int = 9) -> dict[str, Any]:
     """ns per sample by precision and samples per product, and the evaluations of f that they would buy."""
-    from fatigue_runner.benchmark import kernel as kernel_benchmark
     from fatigue_runner.turbine import load_turbine
-    from fatigue_runner.turbine.generated import kernel
 
-    turbine = load_turbine("nrel5mw")
     work: dict[str, Callable[[], float]] = {
         f"{name} {n}": _work(n, kind)
         for name, kind in (("f32", np.float32), ("f64", np.float64))
         for n in SAMPLES
     }
-    packed = kernel_benchmark._loop(kernel.rhs)
-    work["f"] = kernel_benchmark._work(packed, turbine, 256, kernel.LANES)
+    work["f"] = kernel.one_evaluation(load_turbine("nrel5mw"))
     with machine.pinned():
         found = machine.interleaved(work, repeats)
     f = found["f"]["median"]
@@ -77,7 +73,7 @@ def measure_with_one_thread(repeats: int = 9) -> dict[str, Any]:
     """`measure` in a process of its own whose BLAS has one thread: that is settled when NumPy is imported."""
     one = {name: "1" for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")}
     done = subprocess.run(
-        [sys.executable, "-m", "fatigue_runner.benchmark.network", str(repeats)],
+        [sys.executable, "-m", "fatigue_runner.benchmark.speed.network", str(repeats)],
         env={**os.environ, **one, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
         capture_output=True,
         text=True,

@@ -8,7 +8,7 @@ campaign file is fine, too: one set of cases. What a file lists as `integrators`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -19,6 +19,9 @@ from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, input_error, problem
 from fatigue_runner.inputs.source import Source, read_source
 from fatigue_runner.inputs.sweep import Sweep, expand
+from fatigue_runner.integrators import Ensemble, Integrator
+from fatigue_runner.integrators.pitch import PitchSeries
+from fatigue_runner.trajectory import Trajectory
 
 # Seeds 9000 to 9999 are the benchmarks': correctors are trained on seeds from 100,000 on.
 SEEDS = range(9000, 10_000)
@@ -75,28 +78,47 @@ class _File(BaseModel):
 
 @dataclass
 class Cases:
-    """Winds with everything that integrators share; initial (n, 16), times [s], pitch [rad]; reference: (method, step [s]).
+    """An ensemble that every integrator meets, with what its fatigue is judged by and the reference.
 
-    integrators: (method, step, corrector's file or "", mode) that the campaign lists.
+    discard [s]: left out at the start; channels, exponents, residue: of the loads that are counted. integrators: those that the
+    campaign lists.
     """
 
     name: str
-    turbine: Any
-    winds: list[Any]
-    initial: np.ndarray
-    duration: float
-    output_step: float
-    pitch: float
+    ensemble: Ensemble
     discard: float
     channels: list[str]
     exponents: list[float]
     residue: str
-    reference: tuple[str, float]
-    integrators: list[tuple[str, float, str, str]]
+    reference: Integrator
+    integrators: list[Integrator]
+
+    @property
+    def duration(self) -> float:
+        """[s]"""
+        return self.ensemble.duration
+
+    @property
+    def output_step(self) -> float:
+        """[s]"""
+        assert self.ensemble.output_step is not None
+        return self.ensemble.output_step
+
+    @property
+    def pitch(self) -> float:
+        """[rad]; a benchmark has one."""
+        assert not isinstance(self.ensemble.pitch, PitchSeries)
+        return self.ensemble.pitch
 
     @property
     def turbulent(self) -> bool:
-        return any(wind.cell_key is not None for wind in self.winds)
+        return any(wind.cell_key is not None for wind in self.ensemble.winds)
+
+    def run(self, integrator: Integrator, duration: float | None = None) -> list[Trajectory]:
+        """Trajectories of all cases, or of their first `duration` seconds."""
+        from fatigue_runner.integrators import simulate
+
+        return simulate(replace(self.ensemble, duration=duration or self.duration), integrator)
 
 
 # Of files that name none; its quality is measured in every run.
@@ -131,6 +153,7 @@ def _cases(source: Source) -> Cases:
     from fatigue_runner.campaign import checks
     from fatigue_runner.campaign.cases import integrations, wind_cases
     from fatigue_runner.campaign.spec import parse_campaign
+    from fatigue_runner.corrector import load as load_corrector
 
     listed = "integrators" in source.data
     source.data.setdefault("integrators", _ANY)
@@ -149,10 +172,13 @@ def _cases(source: Source) -> Cases:
     named = wind_cases(spec.wind, spec.duration, turbine, source)
     winds = checks.build_winds(named, spec, source)
     initial = checks.initial_states(named, winds, spec, turbine, source)
+    ensemble = Ensemble(
+        turbine, winds, np.stack([initial[case.id] for case in named]), spec.duration, 1.0 / spec.output_rate,
+        float(np.deg2rad(spec.pitch)),
+    )  # fmt: skip
     found = [i for i in integrations(spec, source) if not i.is_reference] if listed else []
     return Cases(
-        spec.name, turbine, winds, np.stack([initial[case.id] for case in named]), spec.duration, 1.0 / spec.output_rate,
-        float(np.deg2rad(spec.pitch)), spec.discard, list(spec.fatigue.channels), list(spec.fatigue.wohler_exponents),
-        spec.fatigue.residue, (spec.reference.method, spec.reference.step),
-        [(i.method, i.step, i.file, i.mode) for i in found],
+        spec.name, ensemble, spec.discard, list(spec.fatigue.channels), list(spec.fatigue.wohler_exponents), spec.fatigue.residue,
+        Integrator(spec.reference.method, spec.reference.step),
+        [Integrator(i.method, i.step, load_corrector(i.file), i.mode) if i.file else Integrator(i.method, i.step) for i in found],
     )  # fmt: skip

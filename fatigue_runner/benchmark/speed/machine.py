@@ -52,18 +52,27 @@ def pinned() -> Iterator[None]:
     The loops neither wait nor use threads: their CPU time is the wall time of an idle machine, and a busy one does not disturb it
     as much.
     """
-    from fatigue_runner.integrators import block
-
     before = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
     if before:
         os.sched_setaffinity(0, {max(before)})
-    clock, block.clock = block.clock, time.thread_time
+    try:
+        with _loops_timed_by(time.thread_time):
+            yield
+    finally:
+        if before:
+            os.sched_setaffinity(0, before)
+
+
+@contextmanager
+def _loops_timed_by(clock: Callable[[], float]) -> Iterator[None]:
+    """`Trajectory.wall_time` by another clock [s]."""
+    from fatigue_runner.integrators import block
+
+    usual, block.clock = block.clock, clock
     try:
         yield
     finally:
-        block.clock = clock
-        if before:
-            os.sched_setaffinity(0, before)
+        block.clock = usual
 
 
 def spread(values: Any) -> dict[str, float]:

@@ -1,0 +1,1 @@
+"""What is told of the measurements: Markdown for the terminal and for docs/, figures, tables."""

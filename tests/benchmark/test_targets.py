@@ -1,0 +1,68 @@
+"""The developers' targets are judged from the figures that the benchmarks write."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+from benchmark_points import point, result
+from places import ROOT
+
+sys.path.insert(0, str(ROOT / "tools"))
+import targets
+
+
+def learned(step, cost, error, **others):
+    return point("rk4 + affine, enhanced", step, cost, error, "enhanced", **others)
+
+
+def test_targets_say_reached_or_missed():
+    plain = [point("a", 0.1, 40, 1e-2), point("a", 0.05, 400, 1e-5)]
+    good = result([*plain, learned(0.1, 20, 5e-5)])
+    found = targets.of_integrators(good)
+    # at 1e-3 the classical curve costs 40 * 10^(1/3), at 1e-4 40 * 10^(2/3)
+    assert [round(float(t.found.split(" ")[0]), 2) for t in found[:2]] == [4.31, 9.28]
+    assert all(t.reached for t in found) and "moonshot" not in found[0].found and "moonshot" in found[1].found
+    bad = result([*plain, learned(0.1, 90, 5e-5)])
+    assert [t.reached for t in targets.of_integrators(bad)] == [False, False, False, False, False]
+    assert str(targets.of_integrators(bad)[0]).startswith("**missed**: 3 times less time")
+
+
+def test_the_papers_target_is_judged_on_the_papers_turbine_only():
+    p = point("heun + affine, enhanced", 0.01, 200, 1e-6, "enhanced", delta_e_range=[1e-11, 1e-12, 1e-9])
+    assert targets.of_integrators(result([p], turbulent=False)) == []
+    judged = targets.of_integrators(result([p], turbulent=False) | {"turbine": "t2b1i1cg"})
+    assert [t.reached for t in judged] == [True] and "1.0e-11" in judged[0].found
+
+
+def test_figures_as_the_commands_write_them_are_judged_and_a_missed_target_is_exit_code_1(
+    tmp_path, monkeypatch, capsys
+):
+    plain = [point("a", 0.1, 40, 1e-2), point("a", 0.05, 400, 1e-5)]
+    part = result([*plain, learned(0.1, 20, 5e-5)])
+    part["points"] = [p.to_dict() for p in part["points"]]
+    rates = {"fatigue-runner, zstd": {"per_second": 499_999.0, "ratio": 9.0}}
+    written = {
+        "work.json": {"identity": "x", "cases": [part]},
+        "logs.json": {
+            "writers": rates,
+            "readers": {"fatigue-runner, zstd": {"per_second": 5e5, "ratio": 9.0}},
+        },
+        "live.json": {"situations": {}, "slower": 0.021},
+        "kernel.json": {"cases": [], "whole_steps": []},
+    }
+    for name, figures in written.items():
+        (tmp_path / name).write_text(json.dumps(figures))
+
+    def judge(name: str) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["targets.py", str(tmp_path / name)])
+        return targets.main(), capsys.readouterr().out
+
+    code, out = judge("work.json")
+    assert code == 0 and out.count("- reached:") == 5
+    code, out = judge("logs.json")
+    assert code == 1 and "**missed**: 500,000 rows per second written: 499,999" in out
+    assert "reached: 500,000 rows per second read: 500,000" in out
+    code, out = judge("live.json")
+    assert code == 1 and "**missed**: a watched campaign at most 2% slower: 2.1%" in out
+    assert judge("kernel.json")[0] == 0
