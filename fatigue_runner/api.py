@@ -54,34 +54,24 @@ def simulate(
     `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid", which guards it. Raises InputError
     for an unknown method or turbine, a step that is not positive and a malformed state.
     """
-    from fatigue_runner.integrators import METHODS, simulate_block
+    from fatigue_runner.integrators import Ensemble, Integrator
+    from fatigue_runner.integrators import simulate as run
 
     if isinstance(turbine, str):
         turbine = load_turbine(turbine)
     if isinstance(wind, int | float):
         wind = ConstantWind(float(wind))
-    if method not in METHODS:
-        raise InputError(f"unknown method {method!r}{did_you_mean(method, METHODS)}")
     for name, value in (("step", step), ("duration", duration), ("output_step", output_step)):
         if value is not None and not value > 0:
             raise InputError(f"{name} must be above 0 s, got {value!r}")
-    start = _state(turbine, initial, wind, first_pitch(pitch))
     if corrector is not None:
         from fatigue_runner.corrector import find
 
         corrector = find(corrector)
-    return simulate_block(
-        turbine,
-        method,
-        step,
-        [wind],
-        start[None, :],
-        duration,
-        output_step,
-        pitch=pitch,
-        corrector=corrector,
-        mode=mode,
-    )[0]
+    integrator = Integrator(method, step, corrector, mode)
+    wind = wind.on(turbine.rotor)
+    start = _state(turbine, initial, wind, first_pitch(pitch))
+    return run(Ensemble(turbine, [wind], start[None, :], duration, output_step, pitch), integrator)[0]
 
 
 def correctors() -> list[Any]:

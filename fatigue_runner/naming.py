@@ -1,12 +1,11 @@
-"""How an integrator is called: its id in file names and case ids, its label where a person reads. One place for both."""
+"""How integrators and winds are called: ids in file names and case ids, labels where a person reads. One place for all."""
 
 from __future__ import annotations
 
 
 def integrator_id(method: str, step: float, corrector: str = "", mode: str = "") -> str:
     """`heun_10ms`, `rk7_0.1ms`, `heun_10ms_hybrid_heun-10ms`; step [s], corrector: its name."""
-    parts = (f"{method}_{step * 1e3:.9g}ms", mode if corrector else "", corrector)
-    return "_".join(part for part in parts if part)
+    return joined(f"{method}_{step * 1e3:.9g}ms", mode if corrector else "", corrector)
 
 
 def integrator_label(method: str, step: float, corrector: str = "", mode: str = "") -> str:
@@ -21,3 +20,19 @@ FAMILIES = {"mlp": "network", "paper": "network"}
 def integrator_series(method: str, family: str = "", mode: str = "") -> str:
     """What integrators at any step have in common: `heun`, `heun + network, hybrid`; family: that of the corrector."""
     return f"{method} + {FAMILIES.get(family, family)}, {mode}" if family else method
+
+
+def joined(*parts: str) -> str:
+    """An id of the parts that are not empty."""
+    return "_".join(part for part in parts if part)
+
+
+def speed_id(speed: float) -> str:
+    """`v08.00`, `v07.1234`: sorted by name is sorted by speed [m/s] for the usual two digits."""
+    text = f"{speed:05.2f}" if round(speed, 2) == speed else f"{speed:.9g}"
+    return "v" + (text if speed >= 10 or text.startswith("0") else f"0{text}")
+
+
+def value_id(value: float) -> str:
+    """`0.14`, `0.123457`: two digits where these say all."""
+    return f"{value:.2f}" if round(value, 2) == value else f"{value:.6g}"

@@ -17,6 +17,7 @@ import numpy as np
 
 import fatigue_runner
 from fatigue_runner.channels import LOAD_NAMES, STATE_NAMES
+from fatigue_runner.rotor import Rotor
 from fatigue_runner.trajectory import Trajectory
 
 ORDERS = {"heun": 2, "rk3": 3, "rk4": 4, "rk7": 30}
@@ -41,10 +42,8 @@ def build_world(monkeypatch: Any) -> World:
     turbine = types.SimpleNamespace(
         name="toy",
         hash="0" * 64,
-        parameters={
-            **{"radius": 63.0, "g_ratio": 97.0},
-            **{"t_h": 88.0, "tower_to_shaft": 2.0, "overhang": -5.0, "sin_tilt": 0.0},
-        },
+        parameters={"g_ratio": 97.0},
+        rotor=Rotor(63.0, 90.0),
         kernel_data=lambda pitch: None,
         operating_point=lambda speed, *shears, pitch: np.full(len(STATE_NAMES), 0.1 * speed),
     )

@@ -43,7 +43,9 @@ def turbine(name: str = "nrel5mw") -> Any:
 
 
 def turbulent(duration: float, seed: int = 1, mean: float = 8.0) -> Any:
-    return fr.TurbulentWind(mean, intensity=0.14, seed=seed, duration=duration)
+    # with the sizes that older trees assume for every turbine
+    sizes: Any = {"rotor_radius": 63.0, "hub_height": 90.0}
+    return fr.TurbulentWind(mean, intensity=0.14, seed=seed, duration=duration, **sizes)
 
 
 def trajectory_parts(trajectory: Any, prefix: str = "") -> Parts:

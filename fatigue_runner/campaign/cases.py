@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner.campaign.spec import Campaign, Integrator, Wind
+from fatigue_runner.campaign.spec import Campaign, Integrator
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.source import Source
+from fatigue_runner.inputs.source import Place, Source
 from fatigue_runner.inputs.sweep import expand
+from fatigue_runner.naming import integrator_id
+from fatigue_runner.wind.section import Realisation, Site
 
 # The code that decides the figures of a case.
 NUMERICAL_CODE = (
@@ -27,25 +29,6 @@ NUMERICAL_CODE = (
     "accuracy.py",
     "campaign/evaluate.py",
 )
-
-
-@dataclass(frozen=True)
-class WindCase:
-    """One wind realisation: its name in case ids, and plain values that make it on any worker."""
-
-    id: str
-    kind: str  # a kind of `fatigue_runner.wind`, or 'file'
-    parameters: tuple[tuple[str, Any], ...]
-    path: tuple[str | int, ...] = ()  # where in the campaign file it stands
-
-    def build(self) -> Any:
-        """The wind source; raises InputError for parameters that it refuses."""
-        from fatigue_runner.wind import make_wind, read_wind_file
-
-        parameters = dict(self.parameters)
-        if self.kind == "file":
-            return read_wind_file(parameters["file"])
-        return make_wind(self.kind, **parameters)
 
 
 @dataclass(frozen=True)
@@ -64,7 +47,7 @@ class Integration:
     @property
     def id(self) -> str:
         """`heun_10ms`, `rk7_0.1ms`, `heun_10ms_hybrid_heun-10ms`."""
-        return _join(f"{self.method}_{self.step * 1e3:.9g}ms", self.mode, self.corrector)
+        return integrator_id(self.method, self.step, self.corrector, self.mode)
 
 
 @dataclass(frozen=True)
@@ -77,85 +60,16 @@ class Case:
     """
 
     id: str
-    wind: WindCase
+    wind: Realisation
     integration: Integration
     simulation_hash: str
     hash: str
 
 
-def wind_cases(wind: Wind, duration: float, turbine: Any, source: Source) -> list[WindCase]:
-    """Every combination of speed, shear and seed in the order speed, shear, seed; or one per file."""
-    if wind.type == "file":
-        return [_file_case(source, name, index) for index, name in enumerate(wind.files)]
-    combine = {"constant": _constant_cases, "turbulent": _turbulent_cases}[wind.type]
-    return [
-        case
-        for speed, piece in expand(wind.speeds)
-        for case in combine(wind, speed, ("wind", "speeds", piece), duration, turbine)
-    ]
-
-
-def _constant_cases(
-    wind: Wind, speed: float, path: tuple[str | int, ...], duration: float, turbine: Any
-) -> Iterable[WindCase]:
-    if wind.shear_exponent is None:
-        vertical = [value for value, _ in expand(wind.vertical_shear)]
-    else:
-        radius, height = rotor(turbine)
-        vertical = [wind.shear_exponent * radius / height]
-    for kv in vertical:
-        for kh, _ in expand(wind.horizontal_shear):
-            yield WindCase(
-                _join(_speed(speed), kv and f"kv{_value(kv)}", kh and f"kh{_value(kh)}"),
-                "constant",
-                (("speed", speed), ("vertical_shear", kv), ("horizontal_shear", kh)),
-                path,
-            )
-
-
-def _turbulent_cases(
-    wind: Wind, speed: float, path: tuple[str | int, ...], duration: float, turbine: Any
-) -> Iterable[WindCase]:
-    strength = (
-        ("intensity", wind.intensity)
-        if wind.turbulence_class is None
-        else ("turbulence_class", wind.turbulence_class)
-    )
-    shear = () if wind.shear_exponent is None else (("shear_exponent", wind.shear_exponent),)
-    sizes = tuple(zip(("rotor_radius", "hub_height"), rotor(turbine), strict=True))
-    for seed in wind.seeds_at(speed):
-        label = f"ti{_value(wind.intensity)}" if wind.intensity is not None else f"ntm{wind.turbulence_class}"
-        yield WindCase(
-            _join(_speed(speed), label, f"s{seed}"),
-            "turbulent",
-            (("mean", speed), strength, ("seed", seed), ("duration", duration), *shear, *sizes),
-            path,
-        )
-
-
-def rotor(turbine: Any) -> tuple[float, float]:
-    """Rotor radius and hub height [m] of a turbine, from the parameters of its equations."""
-    p = turbine.parameters
-    return p["radius"], p["t_h"] + p["tower_to_shaft"] + p["overhang"] * p["sin_tilt"]
-
-
-def _file_case(source: Source, name: str, index: int) -> WindCase:
-    path = resolve(source, name)
-    try:
-        digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        where = source.where(("wind", "files", index))
-        raise InputError(
-            f"{where}: wind file {name!r} cannot be read ({error.strerror}); paths start at the campaign file"
-        ) from None
-    stem = "".join(c if c.isalnum() or c in ".-" else "-" for c in path.stem)
-    return WindCase(stem, "file", (("file", str(path)), ("sha256", digest)), ("wind", "files", index))
-
-
-def resolve(source: Source, name: str) -> Path:
-    """A path written in the campaign file: relative to that file."""
-    path = Path(name).expanduser()
-    return path if path.is_absolute() else source.folder / path
+def realisations(campaign: Campaign, turbine: Any, source: Source) -> list[Realisation]:
+    """Every wind of the campaign, on this turbine."""
+    site = Site(turbine.rotor, campaign.duration, Place(source, ("wind",)))
+    return list(campaign.wind.realisations(site))
 
 
 def integrations(campaign: Campaign, source: Source) -> list[Integration]:
@@ -189,7 +103,7 @@ def _corrector(integrator: Integrator, source: Source, index: int) -> tuple[str,
 
 
 def make_cases(
-    campaign: Campaign, winds: Sequence[WindCase], turbine_hash: str, source: Source
+    campaign: Campaign, winds: Sequence[Realisation], turbine_hash: str, source: Source
 ) -> list[Case]:
     """All cases of a campaign, wind by wind, the reference of a wind first."""
     common = campaign.model_dump(include={"duration", "output_rate", "initial", "pitch"})
@@ -202,8 +116,7 @@ def make_cases(
             simulation = {
                 "code": code_hash(),
                 "turbine": turbine_hash,
-                # A file's content counts, not where it lies.
-                "wind": [wind.kind, [pair for pair in wind.parameters if pair[0] != "file"]],
+                "wind": wind.identity,
                 "integration": [integration.method, integration.step, integration.mode, integration.digest],
                 **common,
             }
@@ -260,17 +173,3 @@ def blocks(items: Sequence[Any], keys: Sequence[float | None], size: int, worker
 
 def _digest(value: Any) -> str:
     return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
-
-
-def _join(*parts: Any) -> str:
-    return "_".join(str(part) for part in parts if part)
-
-
-def _speed(speed: float) -> str:
-    """`v08.00`, `v07.1234`: sorted by name is sorted by speed for the usual two digits."""
-    text = f"{speed:05.2f}" if round(speed, 2) == speed else f"{speed:.9g}"
-    return "v" + (text if speed >= 10 or text.startswith("0") else f"0{text}")
-
-
-def _value(value: float) -> str:
-    return f"{value:.2f}" if round(value, 2) == value else f"{value:.6g}"

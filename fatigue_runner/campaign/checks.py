@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.campaign.cases import Integration, WindCase, integrations, resolve
+from fatigue_runner.campaign.cases import Integration, integrations
 from fatigue_runner.campaign.spec import Campaign, Pitch
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.source import Source
 from fatigue_runner.integrators.initial import initial_state
+from fatigue_runner.wind.section import Realisation
 
 # Above this the tip-speed ratio of a 5-MW-sized rotor leaves the aerodynamic tables for good.
 HIGHEST_WIND_SPEED = 40.0
@@ -21,7 +22,7 @@ HIGHEST_WIND_SPEED = 40.0
 def turbine_source(campaign: Campaign, source: Source) -> str:
     """What `load_turbine` takes: a shipped turbine's name, or a YAML's path relative to the campaign file."""
     name = campaign.turbine
-    return str(resolve(source, name)) if Path(name).suffix in {".yaml", ".yml"} or "/" in name else name
+    return str(source.file(name)) if Path(name).suffix in {".yaml", ".yml"} or "/" in name else name
 
 
 def load_turbine(campaign: Campaign, source: Source) -> Any:
@@ -116,14 +117,13 @@ def _unstable(integration: Integration, limit: float, turbine: Any) -> str:
     )
 
 
-def build_winds(cases: Sequence[WindCase], campaign: Campaign, source: Source) -> list[Any]:
+def build_winds(cases: Sequence[Realisation], campaign: Campaign, source: Source) -> list[Any]:
     """The wind sources; raises InputError, with the line, for a wind outside the tables or too short."""
     winds = []
     for case in cases:
-        where = source.where(case.path)
-        speed = dict(case.parameters).get("speed", dict(case.parameters).get("mean"))
-        if speed is not None:
-            _check_speed(speed, where)
+        where = source.where(("wind", *case.path))
+        if case.mean_speed is not None:
+            _check_speed(case.mean_speed, where)
         try:
             wind = case.build()
         except InputError as error:
@@ -139,7 +139,7 @@ def build_winds(cases: Sequence[WindCase], campaign: Campaign, source: Source) -
 
 
 def initial_states(
-    cases: Sequence[WindCase], winds: Sequence[Any], campaign: Campaign, turbine: Any, source: Source
+    cases: Sequence[Realisation], winds: Sequence[Any], campaign: Campaign, turbine: Any, source: Source
 ) -> dict[str, np.ndarray]:
     """{wind id: state (16,) at t = 0}; raises InputError, with the line, where there is no operating point.
 
@@ -157,7 +157,7 @@ def initial_states(
             try:
                 found[key] = initial_state(turbine, campaign.initial, wind, pitch)
             except InputError as error:
-                raise InputError(f"{source.where(case.path)}: {error}") from None
+                raise InputError(f"{source.where(('wind', *case.path))}: {error}") from None
         states[case.id] = found[key]
     return states
 

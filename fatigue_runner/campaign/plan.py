@@ -12,11 +12,11 @@ import numpy as np
 
 from fatigue_runner.campaign import checks
 from fatigue_runner.campaign.block import Job, Setup
-from fatigue_runner.campaign.cases import Case, blocks, code_hash, integrations, make_cases, wind_cases
+from fatigue_runner.campaign.cases import Case, blocks, code_hash, integrations, make_cases, realisations
 from fatigue_runner.campaign.spec import Campaign, parse_campaign
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.source import Source, read_source
+from fatigue_runner.inputs.source import Place, Source, read_source
 
 # Winds per block: the width of the lane kernel. A block is what progress counts in and what Ctrl-C can lose.
 BLOCK_SIZE = 16
@@ -90,7 +90,7 @@ def make_plan(
     turbine = checks.load_turbine(spec, source)
     checks.check_pitch(spec, turbine, source)
     checks.check_integrators(spec, turbine, source)
-    winds = wind_cases(spec.wind, spec.duration, turbine, source)
+    winds = realisations(spec, turbine, source)
     built = checks.build_winds(winds, spec, source)
     keys = {case.id: wind.cell_key for case, wind in zip(winds, built, strict=True)}
     initial = checks.initial_states(winds, built, spec, turbine, source)
@@ -103,10 +103,7 @@ def resolved_yaml(plan: Plan) -> str:
     """The campaign with every default written out, as YAML that can be run again from anywhere."""
     data = plan.campaign.model_dump(exclude={"wind", "integrators", "reference"})
     data["turbine"] = plan.turbine_source
-    wind = plan.campaign.wind.model_dump(exclude_unset=True, exclude_none=True)
-    if "files" in wind:
-        wind["files"] = [str(checks.resolve(plan.source, name)) for name in wind["files"]]
-    data["wind"] = _without_none({"type": plan.campaign.wind.type, **wind})
+    data["wind"] = plan.campaign.wind.resolved(Place(plan.source, ("wind",)))
     data["integrators"] = [_resolved_integrator(item, plan) for item in plan.campaign.integrators]
     data["reference"] = None if plan.campaign.reference is None else plan.campaign.reference.model_dump()
     return _yaml("The campaign of this run folder, with every default written out.", data)

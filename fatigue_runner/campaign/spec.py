@@ -10,15 +10,8 @@ pitch           blade pitch [deg], the same for all cases (default 0); or {time:
 discard         seconds dropped from the start before statistics, fatigue and errors (default 0)
 workers         parallel processes (default 2; `--workers` overrides it)
 
-wind.type              `constant` (default), `turbulent` or `file`
-wind.speeds            mean hub-height speeds [m/s]: a sweep, see below
-wind.vertical_shear    linear shear kappa_v [-], v(z) = v (1 + kappa_v z/R); a sweep (default 0)
-wind.horizontal_shear  linear shear kappa_h [-]; a sweep (default 0)
-wind.shear_exponent    power-law exponent alpha instead of `vertical_shear`: kappa_v = alpha R/H
-wind.intensity         turbulent: sigma_1 / mean speed at hub height [-], e.g. 0.14
-wind.turbulence_class  turbulent: `A`, `B` or `C`, the IEC normal turbulence model, instead of `intensity`
-wind.seeds             turbulent: how many seeds per speed (default 1; no two speeds share one), or a list
-wind.files             file: one path or a list, relative to the campaign file
+wind.type       `constant` (default), `turbulent`, `file`, ...; the other keys of `wind` stand with each source in `wind/`:
+                `ConstantSection`, `TurbulentSection`, `FileSection`, ...
 
 integrators     list of {method, step}: `step` [s] is a sweep, and every method meets every wind; with `corrector`, a name of
                 `fatigue-runner correctors list` or a file's path, its local error is corrected; `mode`: `hybrid` (default),
@@ -49,6 +42,7 @@ from pydantic import (
     Field,
     PlainSerializer,
     PlainValidator,
+    SerializeAsAny,
     ValidationError,
     field_validator,
     model_validator,
@@ -58,8 +52,9 @@ from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, input_error, problem
 from fatigue_runner.inputs.source import Source
-from fatigue_runner.inputs.sweep import Piece, Sweep, as_list, check_not_empty, expand
+from fatigue_runner.inputs.sweep import Piece, Sweep, check_not_empty, expand
 from fatigue_runner.integrators.initial import INITIAL_STATES
+from fatigue_runner.wind.section import WindSection, wind_section
 
 if TYPE_CHECKING:
     from fatigue_runner.integrators.pitch import PitchSeries
@@ -90,73 +85,6 @@ def _positive_steps(pieces: list[Piece]) -> list[Piece]:
         if value <= 0:
             raise problem(f"must be above 0 s; got {value:g}")
     return pieces
-
-
-def _seeds(value: Any) -> int | list[int]:
-    if isinstance(value, list):
-        if not value or not all(type(seed) is int and seed >= 0 for seed in value):
-            raise problem(f"must be a count or a list of whole numbers, 0 or more; got {value!r:.60}")
-        return list(dict.fromkeys(value))
-    if type(value) is not int or not 1 <= value <= 999:
-        raise problem(f"must be a count from 1 to 999 or a list of seeds; got {value!r:.60}")
-    return value
-
-
-class Wind(Section):
-    """What blows: every combination of speed, shear and seed is one wind."""
-
-    type: Literal["constant", "turbulent", "file"] = "constant"
-    speeds: Sweep = Field(default=[])
-    vertical_shear: Sweep = Field(default=[0.0])
-    horizontal_shear: Sweep = Field(default=[0.0])
-    shear_exponent: float | None = Field(default=None, ge=-1, le=1)
-    intensity: float | None = Field(default=None, gt=0, le=1)
-    turbulence_class: Literal["A", "B", "C"] | None = None
-    seeds: Annotated[int | list[int], PlainValidator(_seeds)] = 1
-    files: Annotated[list[str], BeforeValidator(check_not_empty), BeforeValidator(as_list)] = Field(
-        default=[]
-    )
-
-    @model_validator(mode="after")
-    def _keys_of_its_type(self) -> Wind:
-        allowed = {
-            "constant": {"speeds", "vertical_shear", "horizontal_shear", "shear_exponent"},
-            "turbulent": {
-                "speeds",
-                "horizontal_shear",
-                "shear_exponent",
-                "intensity",
-                "turbulence_class",
-                "seeds",
-            },
-            "file": {"files"},
-        }[self.type]
-        given = self.model_fields_set - {"type"}
-        for key in sorted(given - allowed):
-            raise problem(
-                f"means nothing for wind of type {self.type!r}; remove it or change `type`", key=key
-            )
-        if {"vertical_shear", "shear_exponent"} <= given:
-            raise problem("stands beside vertical_shear; give one of the two", key="shear_exponent")
-        if self.type == "turbulent" and (self.intensity is None) == (self.turbulence_class is None):
-            raise problem(
-                "of type 'turbulent' needs either `intensity` (e.g. 0.14) or `turbulence_class` (A, B, C)"
-            )
-        needed = "files" if self.type == "file" else "speeds"
-        if needed not in given:
-            raise problem(f"needs the key {needed!r}")
-        return self
-
-    def seeds_at(self, speed: float) -> list[int]:
-        """The seeds of the winds of a mean speed [m/s].
-
-        A count gives seeds that no other speed has, because winds of one seed share their phases at all
-        speeds; they depend on nothing but the speed, so that more speeds or more seeds leave the others as
-        they are. A list is taken literally.
-        """
-        if isinstance(self.seeds, list):
-            return self.seeds
-        return [1000 * round(100 * speed) + number for number in range(1, self.seeds + 1)]
 
 
 class Integrator(Section):
@@ -271,7 +199,7 @@ class Campaign(Section):
     pitch: Annotated[float | Pitch, PlainValidator(_pitch), PlainSerializer(_plain_pitch)] = 0.0
     discard: float = Field(default=0.0, ge=0)
     workers: int = Field(default=2, ge=1, le=1024)
-    wind: Wind
+    wind: Annotated[SerializeAsAny[WindSection], PlainValidator(wind_section)]
     integrators: Annotated[list[Integrator], BeforeValidator(check_not_empty)]
     reference: Reference | None = Reference()
     fatigue: Fatigue = Fatigue()

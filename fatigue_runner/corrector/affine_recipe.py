@@ -95,6 +95,7 @@ class Winds(_Part):
             TurbulentWind(
                 v, intensity=float(rng.uniform(*self.intensity)), shear_exponent=float(rng.uniform(*self.shear_exponent)),
                 seed=100_000 + 1000 * self.seed + number, duration=self.duration,
+                rotor_radius=63.0, hub_height=90.0,  # whatever the turbine: the shipped correctors were trained so
             )
             for number, v in enumerate(self.speed_list)
         ]  # fmt: skip

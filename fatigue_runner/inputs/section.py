@@ -32,7 +32,7 @@ _WORDS = {
 
 def problem(message: str, key: str | None = None, **more: Any) -> PydanticCustomError:
     """An error inside a validator: one sentence; `key` is the key of the section that it is about."""
-    return PydanticCustomError("campaign_problem", "{sentence}", {"sentence": message, "key": key, **more})
+    return PydanticCustomError("problem", "{sentence}", {"sentence": message, "key": key, **more})
 
 
 class Section(BaseModel):
@@ -48,10 +48,20 @@ class Section(BaseModel):
             raise problem(f"must be a section with the keys {', '.join(cls.model_fields)}; got {data!r:.60}")
         for key in data:
             if key not in cls.model_fields and key not in cls.synonyms:
-                raise problem(did_you_mean(key, cls.model_fields), key=key, unknown=True)
+                raise cls.unknown(key)
             if cls.synonyms.get(key) in data:
                 raise problem(f"says the same as {cls.synonyms[key]!r}; keep one of the two", key=key)
+        cls.check_complete(data)
         return {cls.synonyms.get(key, key): value for key, value in data.items()}
+
+    @classmethod
+    def unknown(cls, key: str) -> PydanticCustomError:
+        """The error for a key that the section has not."""
+        return problem(did_you_mean(key, cls.model_fields), key=key, unknown=True)
+
+    @classmethod
+    def check_complete(cls, data: dict[str, Any]) -> None:
+        """Where a section says in words of its own what is missing."""
 
 
 def input_error(error: ValidationError, source: Source) -> InputError:
@@ -74,7 +84,7 @@ def _sentence(item: Any, path: tuple[Any, ...], source: Source) -> str:
     if item["type"] == "missing":
         return f"key {path[-1]!r} is missing{_inside(path[:-1], source)}"
     name = key_name(path, source) or "the campaign"
-    if item["type"] == "campaign_problem":
+    if item["type"] == "problem":
         return f"{name}: {item['msg']}"
     if item["type"] == "literal_error":
         known = [word.strip(" '") for word in context["expected"].replace(" or ", ",").split(",")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,22 @@ from fatigue_runner.errors import InputError
 # Aliases (`&a`, `*a`) can nest into each other and grow without bound from a few bytes of text.
 MAX_VALUES = 100_000
 MAX_DEPTH = 32
+
+
+@dataclass(frozen=True)
+class Place:
+    """A section of a source, as what reads the section sees it."""
+
+    source: Source
+    path: tuple[str | int, ...] = ()
+
+    def where(self, *key: str | int) -> str:
+        """The place of a key below the section, as a user reads it: `campaigns/sweep.yaml:14`."""
+        return self.source.where((*self.path, *key))
+
+    def file(self, name: str) -> Path:
+        """The file that a value names."""
+        return self.source.file(name)
 
 
 class Source:
@@ -45,6 +62,11 @@ class Source:
         """The place as a user reads it: `campaigns/sweep.yaml:14`."""
         line = self.line(path)
         return self.name if line is None else f"{self.name}:{line}"
+
+    def file(self, name: str) -> Path:
+        """The file that a value names; relative paths start at the source's folder."""
+        path = Path(name).expanduser()
+        return path if path.is_absolute() else self.folder / path
 
     def section(self, path: tuple[str | int, ...], without: Sequence[str] = ()) -> Source:
         """The mapping at `path` laid over the top level, less the top level's keys `without`: one campaign of a file that

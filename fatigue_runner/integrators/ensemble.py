@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.integrators.block import simulate_block
-from fatigue_runner.integrators.methods import METHODS, Method
+from fatigue_runner.integrators.methods import METHODS, Method, method
 from fatigue_runner.integrators.pitch import PitchSeries
 from fatigue_runner.naming import integrator_id, integrator_label
 
@@ -49,7 +49,7 @@ class Integrator:
     @property
     def found(self) -> Method:
         """The method itself."""
-        return METHODS[self.method]
+        return method(self.method)
 
     @property
     def corrector_name(self) -> str:
@@ -77,7 +77,8 @@ class Ensemble:
     """Cases of one turbine that share duration and output: n winds, each with its state (16,) at t = 0.
 
     initial (n, 16); duration, output_step [s] (None: output at every step); pitch [rad]: a number or a PitchSeries, the same for
-    all. Winds need not share a time grid: `simulate` groups them. Raises InputError where the shapes do not fit.
+    all. Winds need not share a time grid: `simulate` groups them. A wind that depends on the turbine's size is made for this one.
+    Raises InputError where the shapes do not fit.
     """
 
     turbine: Turbine
@@ -86,6 +87,9 @@ class Ensemble:
     duration: float
     output_step: float | None = None
     pitch: float | PitchSeries = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "winds", [wind.on(self.turbine.rotor) for wind in self.winds])
 
     def __len__(self) -> int:
         return len(self.winds)

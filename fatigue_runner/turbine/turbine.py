@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.rotor import Rotor
 from fatigue_runner.turbine.parameters import (
     at_pitch,
     checked,
@@ -65,6 +66,11 @@ class Turbine:
     def rotor_radius(self) -> float:
         """R of the tip-speed ratio and the shears: the tips' distance from the shaft [m]."""
         return self.parameters["radius"]
+
+    @property
+    def rotor(self) -> Rotor:
+        """What a wind source needs to know of the turbine."""
+        return Rotor(self.rotor_radius, self.hub_height)
 
     @property
     def gearbox_ratio(self) -> float:

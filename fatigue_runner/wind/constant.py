@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydantic import Field, model_validator
 
 from fatigue_runner.channels import WIND_NAMES
+from fatigue_runner.inputs.section import problem
+from fatigue_runner.inputs.sweep import Sweep, expand
+from fatigue_runner.naming import joined, speed_id, value_id
 from fatigue_runner.wind.checks import number, wind_speed
+from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.source import WindSource
 
 
@@ -54,3 +60,43 @@ class ConstantWind(WindSource):
         coefficients = np.zeros((n_cells, 4, len(WIND_NAMES)))
         coefficients[:, 0] = self.speed, self.vertical_shear, self.horizontal_shear
         return coefficients
+
+
+class ConstantSection(WindSection):
+    """Every combination of speed and shears, in this order.
+
+    speeds             hub-height speeds [m/s]: a sweep
+    vertical_shear     linear shear kappa_v [-], v(z) = v (1 + kappa_v z/R); a sweep (default 0)
+    horizontal_shear   linear shear kappa_h [-]; a sweep (default 0)
+    shear_exponent     power-law exponent alpha instead of `vertical_shear`: kappa_v = alpha R/H
+    """
+
+    kind = "constant"
+
+    speeds: Sweep
+    vertical_shear: Sweep = Field(default=[0.0])
+    horizontal_shear: Sweep = Field(default=[0.0])
+    shear_exponent: float | None = Field(default=None, ge=-1, le=1)
+
+    @model_validator(mode="after")
+    def _one_vertical_shear(self) -> ConstantSection:
+        if {"vertical_shear", "shear_exponent"} <= self.model_fields_set:
+            raise problem("stands beside vertical_shear; give one of the two", key="shear_exponent")
+        return self
+
+    def realisations(self, site: Site) -> Iterator[Realisation]:
+        vertical = [value for value, _ in expand(self.vertical_shear)]
+        if self.shear_exponent is not None:
+            vertical = [self.shear_exponent * site.rotor.radius / site.rotor.hub_height]
+        for speed, piece in expand(self.speeds):
+            for kv in vertical:
+                for kh, _ in expand(self.horizontal_shear):
+                    yield Realisation(
+                        joined(
+                            speed_id(speed), *(f"{k}{value_id(x)}" for k, x in (("kv", kv), ("kh", kh)) if x)
+                        ),
+                        self.kind,
+                        (("speed", speed), ("vertical_shear", kv), ("horizontal_shear", kh)),
+                        ("speeds", piece),
+                        speed,
+                    )

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from fatigue_runner.channels import WIND_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.inputs.source import Place
+from fatigue_runner.inputs.sweep import as_list, check_not_empty
+from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.series import SeriesWind
 from fatigue_runner.wind.source import SOURCES
 
@@ -105,3 +112,32 @@ def _time_step(path: Path, lines: list[int], time: np.ndarray) -> float:
 
 
 SOURCES["file"] = read_wind_file
+
+
+class FileSection(WindSection):
+    """One wind per file.
+
+    files   one path or a list, relative to the campaign file; the columns: `read_wind_file`
+    """
+
+    kind = "file"
+
+    files: Annotated[list[str], BeforeValidator(check_not_empty), BeforeValidator(as_list)]
+
+    def realisations(self, site: Site) -> Iterator[Realisation]:
+        for index, name in enumerate(self.files):
+            path = site.place.file(name)
+            try:
+                digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            except OSError as error:
+                raise InputError(
+                    f"{site.place.where('files', index)}: wind file {name!r} cannot be read ({error.strerror}); "
+                    "paths start at the campaign file"
+                ) from None
+            stem = "".join(c if c.isalnum() or c in ".-" else "-" for c in path.stem)
+            yield Realisation(
+                stem, self.kind, (("path", str(path)),), ("files", index), contents=(("path", digest),)
+            )
+
+    def resolved(self, place: Place) -> dict[str, Any]:
+        return super().resolved(place) | {"files": [str(place.file(name)) for name in self.files]}

@@ -1,4 +1,26 @@
-"""What every wind source is: the base class and the register of kinds."""
+"""What every wind source is: the base class and the register of kinds.
+
+A new source is one file of this folder. In it stand
+
+- a frozen dataclass derived from `WindSource` with a `kind`: its fields are the parameters of `make_wind(kind, ...)`, checked when it
+  is made (`checks`), and it gives the abstract members below: a name, a mean speed, and cubics on uniform cells (`cells`);
+- `on(rotor)`, where it depends on the turbine's size (`Rotor`: radius, hub height): the source with what was left open filled in
+  from the turbine that it blows on. Whoever simulates calls it; a size that was given stays;
+- for campaigns a `section.WindSection` with the same `kind`, which is what the file's `wind: type:` says: its keys as typed fields
+  (`inputs.sweep.Sweep` for numbers that may be swept; a field without default must be given), its own checks, and `realisations(site)`,
+  which gives a `Realisation` for every wind that the section means: id of its case, parameters as plain values, the keys it came from.
+
+    class GustSection(WindSection):
+        \"\"\"speeds   hub-height speeds before the gust [m/s]; a sweep\"\"\"
+        kind = "gust"
+        speeds: Sweep
+
+        def realisations(self, site):
+            for speed, piece in expand(self.speeds):
+                yield Realisation(f"{speed_id(speed)}_gust", self.kind, (("speed", speed),), ("speeds", piece), speed)
+
+Nothing else needs to know: `SOURCES`, campaigns, their errors with file and line, case ids, hashes and the contract tests find it.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +29,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from fatigue_runner.channels import WIND_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.cells import ROUNDING, cell_count, evaluate, minimum
 from fatigue_runner.wind.checks import number
 
@@ -33,6 +56,10 @@ class WindSource(ABC):
         super().__init_subclass__(**options)
         if "kind" in cls.__dict__:
             SOURCES[cls.kind] = cls
+
+    def on(self, rotor: Rotor) -> Self:
+        """The source as it blows on this rotor; itself where that makes no difference."""
+        return self
 
     @classmethod
     @abstractmethod

@@ -23,15 +23,22 @@ point, 600 s at 10 m/s hold 88 % of sigma_1^2 (steps of 0.2 s lose less than 1e-
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Annotated, Any, Self
 
 import numpy as np
+from pydantic import Field, PlainValidator, field_validator, model_validator
 
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.inputs.section import problem
+from fatigue_runner.inputs.sweep import Sweep, expand
+from fatigue_runner.naming import joined, speed_id, value_id
+from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind import rotor_modes, spectrum
 from fatigue_runner.wind.checks import number, refuse_standstill
+from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.series import periodic_cubics
 from fatigue_runner.wind.source import WindSource
 
@@ -39,6 +46,8 @@ from fatigue_runner.wind.source import WindSource
 # is its random stream, so signals added at the end leave the others' series as they are.
 MODES = (0, 1, 1)
 AMPLITUDES = ("gaussian", "random-phase")
+# what a wind that blows on no turbine yet is made for: the NREL 5 MW
+NO_TURBINE = Rotor(63.0, 90.0)
 
 
 @dataclass(frozen=True)
@@ -48,7 +57,8 @@ class TurbulentWind(WindSource):
     `mean` is the hub-height mean V [m/s]; give either `intensity` = sigma_1/V [-] or `turbulence_class`
     ("A+", "A", "B", "C": normal turbulence model). The series is periodic, `duration` [s] long, with a sample
     every `time_step` [s]; halving it adds higher harmonics to the same series. `shear_exponent` is alpha;
-    `rotor_radius` and `hub_height` [m] default to the NREL 5 MW. Equal parameters give equal series on every
+    `rotor_radius` and `hub_height` [m] are those of the turbine that it blows on, unless they are given (`on`;
+    before there is a turbine: the NREL 5 MW's). Equal parameters give equal series on every
     machine, up to the FFT's rounding; one seed gives independent series at different mean wind speeds.
 
     Raises InputError for parameters out of range. The series is made when first asked for; `cells`, `at` and
@@ -64,14 +74,14 @@ class TurbulentWind(WindSource):
     duration: float = 600.0
     shear_exponent: float = 0.2
     time_step: float = 0.2
-    rotor_radius: float = 63.0
-    hub_height: float = 90.0
+    rotor_radius: float | None = None
+    hub_height: float | None = None
     amplitudes: str = "gaussian"
     scaled: bool = False
 
     def __post_init__(self) -> None:
         for key, bounds in BOUNDS.items():
-            if key != "intensity" or self.intensity is not None:
+            if key not in OPTIONAL or getattr(self, key) is not None:
                 object.__setattr__(self, key, number(f"turbulent wind: {key}", getattr(self, key), **bounds))
         if (self.intensity is None) == (self.turbulence_class is None):
             how = "neither" if self.intensity is None else "both"
@@ -100,6 +110,24 @@ class TurbulentWind(WindSource):
         # Without the series: a worker makes it again in less time than it takes to send.
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
+    def on(self, rotor: Rotor) -> Self:
+        if self.rotor_radius is not None and self.hub_height is not None:
+            return self
+        own = self._rotor_or(rotor)
+        return replace(self, rotor_radius=own.radius, hub_height=own.hub_height)
+
+    def _rotor_or(self, other: Rotor) -> Rotor:
+        """The sizes that were given, those of `other` where none were."""
+        return Rotor(
+            other.radius if self.rotor_radius is None else self.rotor_radius,
+            other.hub_height if self.hub_height is None else self.hub_height,
+        )
+
+    @property
+    def rotor(self) -> Rotor:
+        """The disc that the series is made for."""
+        return self._rotor_or(NO_TURBINE)
+
     @property
     def name(self) -> str:
         strength = f"ntm{self.turbulence_class}" if self.intensity is None else f"i{self.intensity:g}"
@@ -112,7 +140,7 @@ class TurbulentWind(WindSource):
     @property
     def mean_shear(self) -> float:
         """Linear vertical shear of the mean wind, alpha R/H: the power law's slope at the hub."""
-        return self.shear_exponent * self.rotor_radius / self.hub_height
+        return self.shear_exponent * self.rotor.radius / self.rotor.hub_height
 
     @property
     def sigma(self) -> float:
@@ -126,7 +154,7 @@ class TurbulentWind(WindSource):
         derived = {"vertical_shear": self.mean_shear, "horizontal_shear": 0.0}
         derived["turbulence_intensity"] = self.sigma / self.mean
         given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("mean", "intensity")}
-        return {**derived, **given}
+        return {**derived, **given, "rotor_radius": self.rotor.radius, "hub_height": self.rotor.hub_height}
 
     @property
     def cell_key(self) -> float:
@@ -145,7 +173,7 @@ class TurbulentWind(WindSource):
     def modal_series(self) -> np.ndarray:
         """Amplitudes a_0, a_z, a_y of the fluctuation at the samples, (n, 3) [m/s]; of zero mean."""
         variances = modal_variances(
-            self.mean, self.rotor_radius, self.hub_height, self.samples, self.time_step, self.scaled
+            self.mean, self.rotor.radius, self.rotor.hub_height, self.samples, self.time_step, self.scaled
         )
         half = np.zeros((self.samples // 2 + 1, len(MODES)), complex)
         for place, variance in enumerate(variances):
@@ -169,6 +197,7 @@ class TurbulentWind(WindSource):
         return self._coefficients[:n_cells]
 
 
+OPTIONAL = {"intensity", "rotor_radius", "hub_height"}
 BOUNDS: dict[str, dict[str, Any]] = {
     "mean": {"above": 0.0, "at_most": 100.0, "unit": " m/s"},
     "intensity": {"at_least": 0.0, "at_most": 1.0, "hint": "it is sigma_1 / mean: 0.14 for 14 %"},
@@ -207,3 +236,76 @@ def uniform(seed: int, stream: tuple[int, ...], count: int) -> np.ndarray:
     """Random numbers in [0, 1), equal on every machine: raw PCG64 words, whose stream numpy guarantees."""
     words = np.random.PCG64(np.random.SeedSequence(seed, spawn_key=stream)).random_raw(count)
     return (words >> np.uint64(11)) * 2.0**-53
+
+
+def _seeds(value: Any) -> int | list[int]:
+    if isinstance(value, list):
+        if not value or not all(type(seed) is int and seed >= 0 for seed in value):
+            raise problem(f"must be a count or a list of whole numbers, 0 or more; got {value!r:.60}")
+        return list(dict.fromkeys(value))
+    if type(value) is not int or not 1 <= value <= 999:
+        raise problem(f"must be a count from 1 to 999 or a list of seeds; got {value!r:.60}")
+    return value
+
+
+class TurbulentSection(WindSection):
+    """Every combination of speed and seed, in this order.
+
+    speeds             mean hub-height speeds [m/s]: a sweep
+    intensity          sigma_1 / mean speed at hub height [-], e.g. 0.14
+    turbulence_class   `A+`, `A`, `B` or `C`, the IEC normal turbulence model, instead of `intensity`
+    shear_exponent     power-law exponent alpha of the mean wind (default 0.2)
+    seeds              how many seeds per speed (default 1; no two speeds share one), or a list
+    """
+
+    kind = "turbulent"
+
+    speeds: Sweep
+    intensity: float | None = Field(default=None, gt=0, le=1)
+    turbulence_class: str | None = None
+    shear_exponent: float | None = Field(default=None, ge=-1, le=1)
+    seeds: Annotated[int | list[int], PlainValidator(_seeds)] = 1
+
+    @field_validator("turbulence_class")
+    @classmethod
+    def _class_exists(cls, name: str | None) -> str | None:
+        if name is not None and name not in spectrum.TURBULENCE_CLASSES:
+            raise problem(f"{name!r} is not known{did_you_mean(name.upper(), spectrum.TURBULENCE_CLASSES)}")
+        return name
+
+    @model_validator(mode="after")
+    def _one_strength(self) -> TurbulentSection:
+        if (self.intensity is None) == (self.turbulence_class is None):
+            classes = ", ".join(spectrum.TURBULENCE_CLASSES)
+            raise problem(
+                f"of type 'turbulent' needs either `intensity` (e.g. 0.14) or `turbulence_class` ({classes})"
+            )
+        return self
+
+    def seeds_at(self, speed: float) -> list[int]:
+        """The seeds of the winds of a mean speed [m/s].
+
+        A count gives seeds that no other speed has, because winds of one seed share their phases at all
+        speeds; they depend on nothing but the speed, so that more speeds or more seeds leave the others as
+        they are. A list is taken literally.
+        """
+        if isinstance(self.seeds, list):
+            return self.seeds
+        return [1000 * round(100 * speed) + number for number in range(1, self.seeds + 1)]
+
+    def realisations(self, site: Site) -> Iterator[Realisation]:
+        strength: tuple[str, Any] = ("turbulence_class", self.turbulence_class)
+        label = f"ntm{self.turbulence_class}"
+        if self.intensity is not None:
+            strength, label = ("intensity", self.intensity), f"ti{value_id(self.intensity)}"
+        shear = () if self.shear_exponent is None else (("shear_exponent", self.shear_exponent),)
+        sizes = (("rotor_radius", site.rotor.radius), ("hub_height", site.rotor.hub_height))
+        for speed, piece in expand(self.speeds):
+            for seed in self.seeds_at(speed):
+                yield Realisation(
+                    joined(speed_id(speed), label, f"s{seed}"),
+                    self.kind,
+                    (("mean", speed), strength, ("seed", seed), ("duration", site.duration), *shear, *sizes),
+                    ("speeds", piece),
+                    speed,
+                )

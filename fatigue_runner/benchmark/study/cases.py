@@ -151,7 +151,7 @@ def load(campaign: str | Path | Mapping[str, Any]) -> tuple[list[Cases], Setting
 
 def _cases(source: Source) -> Cases:
     from fatigue_runner.campaign import checks
-    from fatigue_runner.campaign.cases import integrations, wind_cases
+    from fatigue_runner.campaign.cases import integrations, realisations
     from fatigue_runner.campaign.spec import parse_campaign
     from fatigue_runner.corrector import load as load_corrector
 
@@ -169,7 +169,7 @@ def _cases(source: Source) -> Cases:
         )
     turbine = checks.load_turbine(spec, source)
     checks.check_pitch(spec, turbine, source)
-    named = wind_cases(spec.wind, spec.duration, turbine, source)
+    named = realisations(spec, turbine, source)
     winds = checks.build_winds(named, spec, source)
     initial = checks.initial_states(named, winds, spec, turbine, source)
     ensemble = Ensemble(

@@ -1,0 +1,108 @@
+"""What a campaign file says under `wind`: one section for every type of wind, declared beside its source.
+
+`source` says how to write one. A campaign asks for nothing but `SECTIONS`, `wind_section` and the winds that a section means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from pydantic_core import PydanticCustomError
+
+from fatigue_runner.errors import did_you_mean
+from fatigue_runner.inputs.section import Section, problem
+from fatigue_runner.inputs.source import Place
+from fatigue_runner.rotor import Rotor
+from fatigue_runner.wind.source import WindSource, make_wind
+
+# type -> its section; filled as the modules of this folder are imported
+SECTIONS: dict[str, type[WindSection]] = {}
+DEFAULT = "constant"
+
+
+@dataclass(frozen=True)
+class Site:
+    """What a section needs to know beside its own keys: the turbine's rotor, the time that every case runs [s], and its own
+    place in the file, for errors and for paths."""
+
+    rotor: Rotor
+    duration: float
+    place: Place
+
+
+@dataclass(frozen=True)
+class Realisation:
+    """One wind of a campaign: its name in case ids, and plain values that make it on any worker.
+
+    parameters: of `make_wind`; path: the keys that it came from, below the section; mean_speed [m/s] where it is known before the
+    wind is made; contents {parameter: hash} of files: what is in them decides the figures, not where they lie.
+    """
+
+    id: str
+    kind: str
+    parameters: tuple[tuple[str, Any], ...]
+    path: tuple[str | int, ...] = ()
+    mean_speed: float | None = None
+    contents: tuple[tuple[str, str], ...] = ()
+
+    def build(self) -> WindSource:
+        """The wind source; raises InputError for parameters that it refuses."""
+        return make_wind(self.kind, **dict(self.parameters))
+
+    @property
+    def identity(self) -> list[Any]:
+        """What decides the wind, as plain values to be hashed."""
+        return [self.kind, [list(pair) for pair in (dict(self.parameters) | dict(self.contents)).items()]]
+
+
+class WindSection(Section):
+    """The base of all wind sections; `kind` is what the file's `type` says."""
+
+    kind: ClassVar[str]
+
+    type: str = DEFAULT
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        super().__pydantic_init_subclass__(**options)
+        if "kind" in cls.__dict__:
+            SECTIONS[cls.kind] = cls
+
+    def realisations(self, site: Site) -> Iterable[Realisation]:
+        """Every wind that the section means, in a stated order. Raises InputError with the place, `site.place.where(key)`."""
+        raise NotImplementedError
+
+    def resolved(self, place: Place) -> dict[str, Any]:
+        """The section as it can be read again from anywhere: as it was given, paths made absolute."""
+        return {"type": self.kind, **self.model_dump(exclude_unset=True, exclude_none=True)}
+
+    @classmethod
+    def unknown(cls, key: str) -> PydanticCustomError:
+        if any(key in section.model_fields for section in SECTIONS.values()):
+            return problem(
+                f"means nothing for wind of type {cls.kind!r}; remove it or change `type`", key=key
+            )
+        near = did_you_mean(key, cls.model_fields)
+        if not near.startswith("; did"):
+            near = did_you_mean(
+                key, dict.fromkeys(name for s in SECTIONS.values() for name in s.model_fields)
+            )
+        return problem(near, key=key, unknown=True)
+
+    @classmethod
+    def check_complete(cls, data: dict[str, Any]) -> None:
+        for name, field in cls.model_fields.items():
+            if field.is_required() and name not in data:
+                raise problem(f"needs the key {name!r}")
+
+
+def wind_section(value: Any) -> WindSection:
+    """The section of a campaign file's `wind`, by its `type`; for pydantic's validators."""
+    if isinstance(value, WindSection):
+        return value
+    kind = value.get("type", DEFAULT) if isinstance(value, dict) else DEFAULT
+    if not isinstance(kind, str) or kind not in SECTIONS:
+        raise problem(f"{kind!r} is not known{did_you_mean(str(kind), SECTIONS)}", key="type")
+    return SECTIONS[kind].model_validate(value)
