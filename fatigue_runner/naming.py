@@ -8,9 +8,21 @@ def integrator_id(method: str, step: float, corrector: str = "", mode: str = "")
     return joined(f"{method}_{step * 1e3:.9g}ms", mode if corrector else "", corrector)
 
 
-def integrator_label(method: str, step: float, corrector: str = "", mode: str = "") -> str:
-    """`heun 10 ms`, or `heun-10ms, hybrid`: a corrector's name says its method and step."""
-    return f"{corrector}, {mode}" if corrector else f"{method} {step * 1e3:g} ms"
+def integrator_label(method: str, step: float | None, corrector: str = "", mode: str = "") -> str:
+    """`heun 10 ms`; with a corrector whose name says as much `heun-10ms, hybrid`, else `heun 10 ms + my-net, hybrid`.
+
+    step [s]; None where a table does not say.
+    """
+    base = method if step is None else f"{method} {step_label(step)}"
+    if not corrector:
+        return base
+    told = step is not None and f"{method}-{step * 1e3:g}ms" in corrector
+    return ", ".join(part for part in (corrector if told else f"{base} + {corrector}", mode) if part)
+
+
+def step_label(step: float) -> str:
+    """A step [s] as a person reads it: 0.02 -> `20 ms`."""
+    return f"{step * 1e3:g} ms"
 
 
 # What a corrector's family is called where a person reads: both are networks, the second one the paper's own.

@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from fatigue_runner.naming import integrator_label
+
 Row = Mapping[str, Any]
 
 
@@ -41,9 +43,11 @@ def numbers(rows: Iterable[Row], column: str) -> list[float]:
     return [value for row in rows if (value := number(row, column)) is not None]
 
 
-def format_step(step: float) -> str:
-    """A step [s] in milliseconds without trailing zeros: 0.02 -> '20 ms'."""
-    return f"{step * 1e3:.4g} ms"
+def integrator(row: Row) -> str:
+    """The label of a row's integrator."""
+    return integrator_label(
+        text(row, "method"), number(row, "step"), text(row, "corrector"), text(row, "mode")
+    )
 
 
 def format_percent(value: float) -> str:

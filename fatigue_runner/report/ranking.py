@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 from statistics import median
 
 from fatigue_runner.channels import BY_NAME
+from fatigue_runner.naming import integrator_label
 from fatigue_runner.report.cells import (
     Row,
     format_count,
     format_percent,
-    format_step,
     number,
     numbers,
     text,
@@ -87,11 +87,8 @@ class MethodSummary:
 
     @property
     def label(self) -> str:
-        """The integrator as a person reads it: `rk4 20 ms`, `heun 10 ms + affine (hybrid)`."""
-        text = self.method if self.step is None else f"{self.method} {format_step(self.step)}"
-        if self.corrector:
-            text += f" + {self.corrector}" + (f" ({self.mode})" if self.mode else "")
-        return text
+        """The integrator as a person reads it."""
+        return integrator_label(self.method, self.step, self.corrector, self.mode)
 
     @property
     def complete(self) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.logbook import Log, LogError, read_log, read_metadata
+from fatigue_runner.naming import integrator_label
 from fatigue_runner.turbine.parameters import read_turbine_file
 from fatigue_runner.viewer import colours
 from fatigue_runner.viewer.scene import Geometry, geometry
@@ -108,10 +109,8 @@ def as_viewed(logs: Sequence[tuple[Path, Log]], turbine: str | None = None) -> l
     logs.sort(key=lambda item: not _is_reference(item[1]))
     viewed: list[Viewed] = []
     others = 0
-    labels = [label_of(path, log) for path, log in logs]
     for place, (path, log) in enumerate(logs):
-        # the corrector's name makes labels long, so it is there only where it tells two integrators apart
-        label = label_of(path, log, corrector=labels.count(labels[place]) > 1)
+        label = label_of(path, log)
         mapping = read_turbine_file(turbine) if turbine else turbine_of(log)
         shape = geometry(mapping, radians(_number(log.run.get("pitch_deg"))))
         check_turbine(path, log, shape)
@@ -182,19 +181,13 @@ def check_turbine(path: Path, log: Log, shape: Geometry) -> None:
         )
 
 
-def label_of(path: Path, log: Log, corrector: bool = False) -> str:
-    """As a person calls the integrator of a log: `rk3, 20 ms (hybrid)`; the file's name where the log does not say.
-
-    corrector: with its name, `rk3, 20 ms + rk3-20ms (hybrid)`.
-    """
+def label_of(path: Path, log: Log) -> str:
+    """As a person calls the integrator of a log; the file's name where the log does not say."""
     method, step = log.run.get("method"), _number(log.run.get("step"))
     if not method:
         return path.name.removesuffix(".part").removesuffix(".mcap")
-    mode = log.run.get("mode")
-    label = f"{method}, {step * 1e3:g} ms"
-    label += f" + {log.run['corrector']}" if corrector and log.run.get("corrector") else ""
-    label += f" ({mode})" if mode else ""
-    return f"{label}: reference" if _is_reference(log) else label
+    label = integrator_label(method, step or None, log.run.get("corrector", ""), log.run.get("mode", ""))
+    return f"{label} (reference)" if _is_reference(log) else label
 
 
 def _is_reference(log: Log) -> bool:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.channels import BY_NAME
+from fatigue_runner.naming import integrator_label
 from fatigue_runner.viewer import colours
 
 CHART = (160.0, 90.0)  # width and height of the chart, in its own units
@@ -113,9 +114,9 @@ class Overview:
 
 def integrator(row: dict[str, Any]) -> str:
     """As a person calls the integrator of a row of the results."""
-    name = f"{row.get('method')}, {(row.get('step') or 0) * 1e3:g} ms"
-    if row.get("corrector"):
-        return f"{name} + {row['corrector']} ({row.get('mode')})"
+    name = integrator_label(
+        str(row.get("method")), row.get("step"), row.get("corrector") or "", row.get("mode") or ""
+    )
     return f"{name} (reference)" if row.get("is_reference") else name
 
 

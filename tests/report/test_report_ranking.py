@@ -49,7 +49,7 @@ def test_winds_that_a_corrector_was_not_trained_on_are_counted_with_the_acceptan
     rows = [corrected(11.8, 0.9999), corrected(8.0, 0.9999), corrected(12.5, 0.8), corrected(15.0, 0.62)]
     summaries = ranking.rank([*rows, row(wind=20.0), reference()])
     assert ranking.unseen_winds(summaries) == [
-        "rk4 100 ms + rk4-100ms (hybrid): 2 of 4 winds lie outside the 4.2 to 11.8 m/s that rk4-100ms was trained on, between 12.5 and "
+        "rk4-100ms, hybrid: 2 of 4 winds lie outside the 4.2 to 11.8 m/s that rk4-100ms was trained on, between 12.5 and "
         "15 m/s; the hybrid's acceptance rate is 71\u00a0% there, under the others 99.9\u00a0%."
     ]
 
@@ -121,7 +121,7 @@ def test_rows_as_the_csv_module_reads_them_rank_as_the_typed_rows_do():
 
 def test_a_corrected_integrator_is_another_integrator_than_the_plain_one():
     rows = [row(), row(corrector="affine", mode="hybrid", evaluations=210.0)]
-    assert [s.label for s in ranking.rank(rows)] == ["rk4 20 ms", "rk4 20 ms + affine (hybrid)"]
+    assert [s.label for s in ranking.rank(rows)] == ["rk4 20 ms", "rk4 20 ms + affine, hybrid"]
 
 
 costs = st.integers(1, 5)

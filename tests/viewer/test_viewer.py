@@ -46,7 +46,7 @@ def test_chosen_case_brings_the_other_integrators_of_its_wind(run_folder):
 
 def test_reference_stands_first_and_every_turbine_has_its_own_place_and_colour(run_folder):
     viewed = cases.read_cases(cases.find_logs([run_folder]))
-    assert [v.label for v in viewed] == ["dop853, 20 ms: reference", "heun, 20 ms", "rk3, 20 ms"]
+    assert [v.label for v in viewed] == ["dop853 20 ms (reference)", "heun 20 ms", "rk3 20 ms"]
     assert len({v.colour for v in viewed}) == len({v.key for v in viewed}) == 3
     offsets = np.array([v.offset for v in viewed])
     assert (np.abs(np.diff(offsets)) > 2 * 63).all(), "rotors do not touch"
@@ -58,10 +58,10 @@ def test_correctors_of_one_method_are_told_apart_by_their_names(tmp_path):
         for name in ("affine", "network")
     ]
     assert [v.label for v in cases.read_cases(made)] == [
-        "rk3, 20 ms + affine (hybrid)",
-        "rk3, 20 ms + network (hybrid)",
+        "rk3 20 ms + affine, hybrid",
+        "rk3 20 ms + network, hybrid",
     ]
-    assert [v.label for v in cases.read_cases(made[:1])] == ["rk3, 20 ms (hybrid)"]
+    assert [v.label for v in cases.read_cases(made[:1])] == ["rk3 20 ms + affine, hybrid"]
 
 
 def test_log_of_another_turbine_is_refused(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fatigue_runner.report.blocks import Block, Column, Paragraph, Section, Table, TableRow
-from fatigue_runner.report.cells import Row, format_error, format_percent, format_step, number, text, truth
+from fatigue_runner.report.cells import Row, format_error, format_percent, integrator, number, text, truth
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.sections.limits import lost_probability
 
@@ -80,15 +80,12 @@ def _case(run: Run, row: Row) -> TableRow:
 
 
 def _who(row: Row) -> list[str]:
-    speed, step = number(row, "wind_speed"), number(row, "step")
+    speed = number(row, "wind_speed")
     shear = " / ".join(
         "–" if value is None else f"{value:.3g}"
         for value in (number(row, "vertical_shear"), number(row, "horizontal_shear"))
     )
-    integrator = text(row, "method") + ("" if step is None else f" {format_step(step)}")
-    if text(row, "corrector"):
-        integrator += f" + {text(row, 'corrector')}"
-    return ["–" if speed is None else f"{speed:.4g}", shear, text(row, "seed") or "–", integrator]
+    return ["–" if speed is None else f"{speed:.4g}", shear, text(row, "seed") or "–", integrator(row)]
 
 
 def _at(row: Row) -> str:

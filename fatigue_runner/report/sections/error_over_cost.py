@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from fatigue_runner.naming import step_label
 from fatigue_runner.report.blocks import Figure, Paragraph, Section
-from fatigue_runner.report.cells import format_step
 from fatigue_runner.report.labels import Label, draw_labels
 from fatigue_runner.report.ranking import LEVELS, MethodSummary, pareto
 from fatigue_runner.report.rundata import Run
@@ -119,7 +119,6 @@ def _draw_point(axes: Axes, s: MethodSummary, point: tuple[float, float], look: 
 
 
 def _label(s: MethodSummary, point: tuple[float, float], look: Look, named: bool) -> Label:
-    """The step beside its point; the last point of a line carries the method's name too."""
-    step = "" if s.step is None else format_step(s.step)
-    name = s.method + (f" + {s.corrector}" if s.corrector else "")
-    return Label(point, f"{name} {step}".strip() if named else step, look.colour, bold=named)
+    """The step beside its point; the last point of a line, which is the only one of a corrector, carries the whole name."""
+    step = "" if s.step is None else step_label(s.step)
+    return Label(point, s.label if named else step, look.colour, bold=named)
