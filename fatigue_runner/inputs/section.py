@@ -1,4 +1,4 @@
-"""The base of every section of a campaign file, and pydantic's errors in the words of who wrote the file."""
+"""The base of every section of a file, and pydantic's errors in the words of who wrote the file."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def problem(message: str, key: str | None = None, **more: Any) -> PydanticCustom
 
 
 class Section(BaseModel):
-    """A mapping of the campaign file: unknown keys are refused, text is no number, values do not change."""
+    """A mapping of a file: unknown keys are refused, text is no number, values do not change."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
     synonyms: ClassVar[dict[str, str]] = {}
@@ -65,7 +65,7 @@ class Section(BaseModel):
 
 
 def input_error(error: ValidationError, source: Source) -> InputError:
-    """All problems of a campaign, one sentence each in the order of the file, as the error a user reads."""
+    """All problems of a file, one sentence each in the order of the file, as the error a user reads."""
     found: dict[str, int] = {}
     for item in error.errors(include_url=False):
         path = tuple(part for part in item["loc"] if not str(part).startswith(TAG))
@@ -83,7 +83,7 @@ def _sentence(item: Any, path: tuple[Any, ...], source: Source) -> str:
         return f"unknown key {path[-1]!r}{_inside(path[:-1], source)}{item['msg']}"
     if item["type"] == "missing":
         return f"key {path[-1]!r} is missing{_inside(path[:-1], source)}"
-    name = key_name(path, source) or "the campaign"
+    name = key_name(path, source) or f"the {source.what}"
     if item["type"] == "problem":
         return f"{name}: {item['msg']}"
     if item["type"] == "literal_error":

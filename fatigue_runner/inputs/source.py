@@ -1,4 +1,4 @@
-"""A campaign file as plain data that remembers on which line each value stood."""
+"""A file as plain data that remembers on which line each value stood."""
 
 from __future__ import annotations
 
@@ -32,10 +32,15 @@ class Place:
 
 
 class Source:
-    """Plain `data` (dicts, lists, numbers, text) of a campaign, and `where(path)`: "file:line" of a value."""
+    """Plain `data` (dicts, lists, numbers, text) of a file, and `where(path)`: "file:line" of a value.
 
-    def __init__(self, name: str, data: Any, text: str = "", folder: Path | None = None) -> None:
-        self.name = name
+    what: what the file is, as its messages call it: a campaign, a recipe.
+    """
+
+    def __init__(
+        self, name: str, data: Any, text: str = "", folder: Path | None = None, what: str = "campaign"
+    ) -> None:
+        self.name, self.what = name, what
         self.text = text
         self.folder = folder or Path.cwd()
         self._lines: dict[tuple[str | int, ...], int] = {(): 1}
@@ -76,7 +81,7 @@ class Source:
             own = own[key]
         own = {key: value for key, value in own.items() if path or key not in without}
         shared = {key: value for key, value in self.data.items() if key not in (*without, *own)}
-        out = Source(self.name, {**shared, **own}, self.text, self.folder)
+        out = Source(self.name, {**shared, **own}, self.text, self.folder, self.what)
         out._lines = {
             place: line for place, line in self._lines.items() if place[:1] in {(key,) for key in shared}
         }
@@ -115,18 +120,26 @@ def read_source(campaign: str | Path | Mapping[str, Any]) -> Source:
     """
     if isinstance(campaign, Mapping):
         return Source("campaign", campaign)
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
     path = Path(campaign)
     if path.name == str(campaign) and not path.suffix and not path.exists():
         path = shipped.campaign(path.name)
+    return read_mapping(path, "campaign", "name, duration, wind, integrators, ...")
+
+
+def read_mapping(path: Path, what: str, keys: str) -> Source:
+    """Read a YAML file that holds a mapping: `what` it is and its first `keys` stand in the messages.
+
+    Raises InputError as `read_source`.
+    """
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise InputError(f"{path}: no such file{_nearby(path)}") from None
     except IsADirectoryError:
-        raise InputError(f"{path} is a folder; give the campaign's YAML file") from None
+        raise InputError(f"{path} is a folder; give the {what}'s YAML file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as text: {error}") from None
     try:
@@ -138,12 +151,10 @@ def read_source(campaign: str | Path | Mapping[str, Any]) -> Source:
     except YAMLError as error:  # e.g. control characters: no mark
         raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
     except RecursionError:
-        raise InputError(f"{path}: not a campaign: its brackets nest too deeply") from None
+        raise InputError(f"{path}: not a {what}: its brackets nest too deeply") from None
     if not isinstance(data, Mapping):
-        raise InputError(
-            f"{path}:1: a campaign is a mapping of keys (name, duration, wind, integrators, ...)"
-        )
-    return Source(str(path), data, text, path.resolve().parent)
+        raise InputError(f"{path}:1: a {what} is a mapping of keys ({keys})")
+    return Source(str(path), data, text, path.resolve().parent, what)
 
 
 def _yaml_problem(error: Any) -> str:
