@@ -97,7 +97,7 @@ def test_times_are_taken_in_turns_and_the_median_ratio_is_marked(tools):
     assert "1.020" in fine and "SLOWER" not in fine
 
 
-@pytest.mark.slow  # two processes; the kernels of the commit are compiled where no run did before
+@pytest.mark.slow(reason="two processes; the kernels of the commit are compiled where no run did before")
 def test_a_figure_of_the_last_commit_is_that_of_the_working_tree():
     if subprocess.run(
         ["git", "-C", str(TOOLS), "rev-parse", "HEAD"], capture_output=True, check=False

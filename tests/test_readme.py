@@ -47,7 +47,7 @@ def test_the_campaign_of_the_readme_is_valid():
     assert campaign.name == "my-sweep" and len(campaign.integrators) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="runs the quickstart")
 def test_the_python_of_the_readme_runs(monkeypatch, tmp_path):
     (code,) = blocks("python")
     monkeypatch.chdir(tmp_path)

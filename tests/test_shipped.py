@@ -59,7 +59,7 @@ def wheel(tmp_path_factory) -> Path:
     return made
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="builds a wheel")
 def test_a_wheel_carries_every_file_of_the_package_and_no_test(wheel):
     listed = subprocess.run(
         ["git", "ls-files", "--cached", "--others", "--exclude-standard", "fatigue_runner", "campaigns", "correctors"],
@@ -71,7 +71,7 @@ def test_a_wheel_carries_every_file_of_the_package_and_no_test(wheel):
     assert carried == expected
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="builds a wheel, makes an environment and runs the quickstart in it")
 def test_an_installed_wheel_runs_the_quickstart_by_name_from_an_empty_folder(wheel, tmp_path):
     home = tmp_path / "venv"
     venv.create(home, with_pip=True)

@@ -310,7 +310,7 @@ def test_an_integrator_with_a_corrector_has_a_curve_of_its_own():
     assert integrators.kind(corrected) == "hybrid" and integrators.kind(Integrator("rk4", 0.1)) == "classical"
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="times every kernel in a row of repeats")
 def test_the_kernel_benchmark_finds_packed_code_faster_than_scalar_code():
     from fatigue_runner.benchmark.speed import kernel
 
@@ -321,7 +321,7 @@ def test_the_kernel_benchmark_finds_packed_code_faster_than_scalar_code():
     assert 0 < found["varying_pitch"]["median"] < np.inf
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="the whole shipped benchmark: all methods, all correctors, two sets of winds")
 def test_the_shipped_benchmark_runs_through_and_places_every_corrector(tmp_path):
     found = run.measure(rounds=1)
     page.write(found, tmp_path, tmp_path / "images")

@@ -200,7 +200,7 @@ def test_run_campaign_takes_a_mapping_and_returns_the_table(tmp_path):
     assert results.where(method="heun")[0]["step"] == 0.02
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="a campaign of 200 winds is started, stopped and gone on with")
 def test_ctrl_c_ends_with_130_leaves_no_worker_and_the_same_command_goes_on(tmp_path):
     text = (CAMPAIGNS / "quickstart.yaml").read_text()
     campaign = tmp_path / "long.yaml"

@@ -12,7 +12,7 @@ import pytest
 
 from fatigue_runner.benchmark.speed.kernel import operations
 
-pytestmark = pytest.mark.slow  # compiles everything anew
+pytestmark = pytest.mark.slow(reason="compiles everything anew, since numba shows assembly only then")
 
 # Operations of one evaluation for one case: what an edit of the equations may cost before somebody looks at it.
 MOST_OPERATIONS = 1750

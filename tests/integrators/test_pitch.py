@@ -97,7 +97,9 @@ def test_pitching_to_feather_takes_the_thrust_away(turbine):
     assert run.state[-1, 14] < run.state[0, 14]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(
+    reason="compiles the loop of every family for a pitch per lane; the default loop does heun, rk4, tsit5 and abm4"
+)
 @pytest.mark.parametrize("name", CLASSICAL)
 def test_every_classical_method_takes_a_series(turbine, name):
     start = turbine.operating_point(8.0, pitch=np.radians(4.0))[None]

@@ -159,7 +159,7 @@ def javascript(tmp_path_factory):
     return node, folder
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="installs Foxglove's libraries from npm")
 def test_the_javascript_libraries_of_foxglove_read_and_decode_it(log_path, javascript):
     node, folder = javascript
     script = folder / "read.js"

@@ -326,7 +326,7 @@ def unwatched(tmp_path_factory) -> dict[str, str]:
     return run(tmp_path_factory.mktemp("unwatched") / "run")
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="five whole campaigns, four of them with a viewer")
 class TestRun:
     """Whole campaigns with a viewer that is open, absent, stopped or killed."""
 

@@ -11,7 +11,7 @@ from viewer_pictures import near, part, screen, warm
 
 from fatigue_runner.viewer import colours
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.slow(reason="the viewer draws every picture without a graphics card")
 pytest.importorskip("rerun", reason="rerun-sdk is not installed")
 
 

@@ -360,14 +360,14 @@ def test_gusts_lower_the_shear_in_both():
         assert slope == pytest.approx(-0.14 / 10.0, rel=0.25)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="fits 500 full fields of ten minutes at each of three speeds")
 @pytest.mark.parametrize("mean", [6.0, 10.0, 18.0])
 def test_a_fine_full_field_confirms_the_signals_closely(mean):
     fitted, projected = ensembles(mean, across=23, runs=50, batches=10)
     compare_ensembles(fitted, projected, tolerance=0.06)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(reason="fits 300 full fields of ten minutes")
 def test_the_ten_minute_variance_scatters_like_that_of_a_full_field():
     fitted, projected = ensembles(10.0, across=13, runs=100, batches=3)
     field, disc = (s.var(axis=1).std(axis=0) / s.var(axis=1).mean(axis=0) for s in (fitted, projected))

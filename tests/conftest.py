@@ -1,0 +1,38 @@
+"""How the tests run: the whole suite on a few processes, part of it in one; the kernels are compiled once before."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+
+import joblib
+import pytest
+
+# More do not pay: every process loads the kernels anew, and campaigns under test start workers of their own.
+MOST_PROCESSES = 4
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """For `-n auto` (pyproject.toml): none for files or names that somebody picked, where starting processes takes longest."""
+    everything = config.args_source is config.ArgsSource.TESTPATHS and not config.option.keyword
+    return min(MOST_PROCESSES, joblib.cpu_count()) if everything else 0
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile what is not in the cache, before several processes do so at the same time."""
+    if getattr(session.config.option, "numprocesses", None):
+        compile_kernels(session.config.get_terminal_writer().line)
+
+
+def compile_kernels(say: Callable[[str], None]) -> None:
+    """Every method's kernels, in a process of its own; once for each state of the sources, which name the cache's folder."""
+    from fatigue_runner.compiled import cache_folder
+
+    done = cache_folder() / "tests-may-begin"
+    if done.exists():
+        return
+    say("compiling the kernels, a minute or two ...")
+    code = "from fatigue_runner.integrators import METHODS, warm_up\nfor name in METHODS: warm_up(name)"
+    if subprocess.run([sys.executable, "-c", code]).returncode == 0 and done.parent.is_dir():
+        done.touch()
