@@ -206,9 +206,7 @@ def test_winds_outside_a_correctors_training_stand_in_the_verdict_and_before_the
         for row in rows
     ]
     folder = write_run(tmp_path / "run", changed)
-    assert "rk4-20ms, hybrid: 2 of 6 winds lie outside the 4.2 to 8.4 m/s" in section_text(
-        "limits", folder
-    )
+    assert "rk4-20ms, hybrid: 2 of 6 winds lie outside the 4.2 to 8.4 m/s" in section_text("limits", folder)
     answer = section_text("answer", folder)
     assert answer.count("1 % *") == 1 and "* Some winds lie outside" in answer
     assert " *" not in section_text("answer", write_run(tmp_path / "plain", rows))
