@@ -121,7 +121,36 @@ def rotor_loads(
     """
     arguments = [np.asarray(v, dtype=float) for v in (tip_speed_ratio, pitch, kappa, y, flap, edge, skew)]
     shape = np.broadcast_shapes(*(v.shape for v in arguments))
-    lam, theta, kappa, y, flap, edge, skew = (np.broadcast_to(v, shape).reshape(-1, 1) for v in arguments)
+    arguments = [np.broadcast_to(v, shape).reshape(-1, 1) for v in arguments]
+    along_1, driving = strip_loads(blade, *arguments)
+    n, t = (along_1 @ blade.weights.T).T, (driving @ blade.weights.T).T
+    theta = arguments[1][:, 0]
+    c, s = np.cos(theta), np.sin(theta)
+    loads = [
+        n[0],
+        t[0],
+        t[1] / blade.rotor_radius,
+        n[1] / blade.rotor_radius,
+        *((c * n[i] + s * n[i + 1]) - (c * t[i + 1] - s * t[i]) for i in (2, 4)),
+    ]
+    return np.stack(loads).reshape(len(LOAD_NAMES), *shape)
+
+
+def strip_loads(
+    blade: BladeAerodynamics,
+    lam: Array,
+    theta: Array,
+    kappa: Array,
+    y: Array,
+    flap: Array,
+    edge: Array,
+    skew: Array,
+) -> tuple[Array, Array]:
+    """Loads per length of blade at the stations, (m, n): along e1, and in the rotor plane along the motion.
+
+    Arguments of `rotor_loads` as columns (m, 1); lam is the tip-speed ratio, theta the pitch. In units of
+    (1/3) rho/2 A V^2 per metre.
+    """
     r, big_r, cos_cone = blade.radius, blade.rotor_radius, np.cos(blade.cone)
     c, s = np.cos(theta), np.sin(theta)
     flap_x, flap_y, edge_x, edge_y = blade.shapes.T
@@ -139,16 +168,7 @@ def rotor_loads(
     pressure = blade.chord * speed**2 * (3.0 / (np.pi * big_r**2))
     along_1 = pressure * (lift * np.cos(angle) + drag * np.sin(angle))
     driving = pressure * (lift * np.sin(angle) - drag * np.cos(angle))
-    n, t = (along_1 @ blade.weights.T).T, (driving @ blade.weights.T).T
-    c, s = c[:, 0], s[:, 0]
-    loads = [
-        n[0],
-        t[0],
-        t[1] / big_r,
-        n[1] / big_r,
-        *((c * n[i] + s * n[i + 1]) - (c * t[i + 1] - s * t[i]) for i in (2, 4)),
-    ]
-    return np.stack(loads).reshape(len(LOAD_NAMES), *shape)
+    return along_1, driving
 
 
 def _skewed(normal: Array, speed: Array, angle: Array, lean: Array) -> tuple[Array, Array]:

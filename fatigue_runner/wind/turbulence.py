@@ -41,6 +41,7 @@ from fatigue_runner.wind.checks import number, refuse_standstill
 from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.series import periodic_cubics
 from fatigue_runner.wind.source import WindSource
+from fatigue_runner.wind.streams import uniform
 
 # Order n of the azimuthal mode behind each signal, in the order of `channels.WIND_SIGNALS`. A signal's place
 # is its random stream, so signals added at the end leave the others' series as they are.
@@ -230,12 +231,6 @@ def modal_variances(
     variances = point * np.stack([admittances[n] for n in MODES])
     variances.flags.writeable = False
     return variances
-
-
-def uniform(seed: int, stream: tuple[int, ...], count: int) -> np.ndarray:
-    """Random numbers in [0, 1), equal on every machine: raw PCG64 words, whose stream numpy guarantees."""
-    words = np.random.PCG64(np.random.SeedSequence(seed, spawn_key=stream)).random_raw(count)
-    return (words >> np.uint64(11)) * 2.0**-53
 
 
 def _seeds(value: Any) -> int | list[int]:
