@@ -97,6 +97,12 @@ def test_times_are_taken_in_turns_and_the_median_ratio_is_marked(tools):
     assert "1.020" in fine and "SLOWER" not in fine
 
 
+def test_an_unlucky_process_alone_is_not_slower(tools):
+    times = [(100.0, 117.0), (100.0, 116.0), (118.0, 101.0)]
+    line = tools[2].table({"rk4": times}).splitlines()[1]
+    assert "1.160" in line and "1.010" in line and "SLOWER" not in line
+
+
 @pytest.mark.slow(reason="two processes; the kernels of the commit are compiled where no run did before")
 def test_a_figure_of_the_last_commit_is_that_of_the_working_tree():
     if subprocess.run(
