@@ -15,16 +15,22 @@ import typer
 from typer.core import TyperGroup
 
 from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.terminal import console
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-# Command groups of other rooms, loaded when they are called: (module, its Typer app).
+    from fatigue_runner.campaign import Results
+
+# The rooms' commands, loaded when they are called: modules with a Typer app named `app`.
 MOUNTED = {
-    "benchmark": ("fatigue_runner.benchmark.commands", "app"),
-    "correctors": ("fatigue_runner.corrector.commands", "app"),
-    "logs": ("fatigue_runner.logbook.commands", "app"),
-    "view": ("fatigue_runner.viewer.commands", "app"),
+    "report": "fatigue_runner.report.commands",
+    "view": "fatigue_runner.viewer.commands",
+    "logs": "fatigue_runner.logbook.commands",
+    "turbine": "fatigue_runner.integrators.commands",
+    "train": "fatigue_runner.corrector.train_command",
+    "correctors": "fatigue_runner.corrector.commands",
+    "benchmark": "fatigue_runner.benchmark.commands",
 }
 
 
@@ -37,8 +43,7 @@ class _LazyGroup(TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         if cmd_name not in MOUNTED:
             return super().get_command(ctx, cmd_name)
-        module, attribute = MOUNTED[cmd_name]
-        command = typer.main.get_command(getattr(import_module(module), attribute))
+        command = typer.main.get_command(import_module(MOUNTED[cmd_name]).app)
         command.name = cmd_name
         return command
 
@@ -120,124 +125,53 @@ def run(
         fatigue-runner run my.yaml --live --pace 1
     """
     from fatigue_runner.campaign import CampaignInterrupted, run_campaign
-    from fatigue_runner.cli_tables import print_results
 
-    console = _console()
+    to = console()
     with ExitStack() as until_the_end:
         watch = None
         if live or pace is not None:
             from fatigue_runner.viewer.live import watcher
 
             watch = until_the_end.enter_context(
-                watcher(pace=pace, case=live_case, port=viewer_port, say=console.print)
+                watcher(pace=pace, case=live_case, port=viewer_port, say=to.print)
             )
         try:
             results = run_campaign(
-                campaign, out, workers=workers, fresh=fresh, dask=dask, console=console, watch=watch
+                campaign, out, workers=workers, fresh=fresh, dask=dask, console=to, watch=watch
             )
         except KeyboardInterrupt:
             raise CampaignInterrupted("interrupted; the same command goes on") from None
-    print_results(results, console)
+    _print_outcome(results, to)
     raise typer.Exit(results.exit_code)
 
 
-@app.command()
-def report(
-    run_folder: Annotated[
-        Path, typer.Argument(metavar="RUN_FOLDER", help="The folder that `run` wrote.", show_default=False)
-    ],
-) -> None:
-    """Write `report.html` of a run folder again.
+def _print_outcome(results: Results, console: Console) -> None:
+    """Which integrator is good enough and what it costs, what was lost, and where the files are."""
+    from rich.markup import escape
 
-    Example:
+    from fatigue_runner.report.terminal import print_ranking
 
-        fatigue-runner report runs/quickstart
-    """
-    from fatigue_runner.report import write_report
-
-    typer.echo(f"report: {write_report(run_folder)}")
-
-
-@app.command()
-def turbine(
-    name: Annotated[
-        str, typer.Argument(metavar="[NAME]", help="A shipped turbine, or the path of a turbine YAML.")
-    ] = "nrel5mw",
-    wind: Annotated[
-        list[float] | None,
-        typer.Option("--wind", "-w", help="Wind speed [m/s]; may be repeated. Default 6, 8, 10."),
-    ] = None,
-    pitch: Annotated[float, typer.Option("--pitch", help="Blade pitch [deg], positive to feather.")] = 0.0,
-    write_tables: Annotated[
-        bool,
-        typer.Option(
-            "--write-tables", help="First make the aerodynamic tables that the turbine file names (8 s)."
-        ),
-    ] = False,
-) -> None:
-    """Show a turbine: masses, power coefficient, operating points, natural frequencies, stability limits.
-
-    Examples:
-
-        fatigue-runner turbine
-
-        fatigue-runner turbine t2b1i1cg --wind 8 --wind 11
-
-        fatigue-runner turbine my-turbine.yaml --write-tables
-    """
-    if write_tables:
-        from fatigue_runner.turbine.table_builder import make_tables
-
-        _console().print(f"wrote {make_tables(name)}")
-    from fatigue_runner.cli_tables import print_turbine
-
-    print_turbine(name, wind or [6.0, 8.0, 10.0], pitch, _console())
-
-
-@app.command()
-def train(
-    recipe: Annotated[
-        Path, typer.Argument(metavar="RECIPE", help="The recipe's YAML file.", show_default=False)
-    ],
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder of the result; default: the recipe's.")
-    ] = None,
-    step: Annotated[float | None, typer.Option("--step", help="Another step [s] than the recipe's.")] = None,
-    seed: Annotated[int | None, typer.Option("--seed", help="Another seed than the recipe's.")] = None,
-    name: Annotated[str | None, typer.Option("--name", help="Another name than the recipe's.")] = None,
-    tune: Annotated[
-        int, typer.Option("--tune", min=0, help="Networks: first search with this many Optuna trials.")
-    ] = 0,
-    tune_epochs: Annotated[int, typer.Option("--tune-epochs", min=1, help="Epochs of a trial.")] = 100,
-) -> None:
-    """Train a corrector: NAME.safetensors and its card NAME.md beside the recipe.
-
-    Affine ones take seconds. A network's training can be stopped with Ctrl-C: the same command goes on.
-
-    Examples:
-
-        fatigue-runner train correctors/rk4-100ms.yaml
-
-        fatigue-runner train correctors/rk4-100ms.yaml --step 0.08 --name rk4-80ms --out runs
-    """
-    from fatigue_runner.cli_tables import train_with_progress, tune_with_progress
-    from fatigue_runner.integrators.initial import initial_state
-
-    overrides: dict[str, Any] = {"step": step, "seed": seed, "name": name}
-    if tune:
-        settings = tune_with_progress(recipe, out, initial_state, overrides, tune, tune_epochs, _console())
-        if settings is None:
-            raise typer.Exit(130)
-        overrides |= {"training": settings, "seed": None}
-    train_with_progress(recipe, out, initial_state, overrides, _console())
-
-
-def _console() -> Console:
-    from rich.console import Console
-
-    console = Console(highlight=False)
-    # A file or a pipe has no width; the default of 80 would fold the tables.
-    return console if console.is_terminal else Console(highlight=False, width=120)
+    console.print()
+    print_ranking(results.rows, console)
+    for row in results.lost[:10]:
+        when = (
+            f"at {row['diverged_at']:.4g} s" if row["status"] == "diverged" else f": {row['error_message']}"
+        )
+        console.print(f"[red]{row['status']}[/] {escape(row['case_id'])} {escape(when)}", soft_wrap=True)
+    if len(results.lost) > 10:
+        console.print(f"... and {len(results.lost) - 10} more; see the column `status` of results.csv")
+    console.print(
+        f"{len(results)} cases, {results.simulated} of them simulated now, in {results.wall_time:.1f} s; "
+        f"table: {escape(str(results.out / 'results.csv'))}",
+        soft_wrap=True,
+    )
+    if results.report_error:
+        console.print(f"[red]no report:[/] {escape(results.report_error)}", soft_wrap=True)
+        console.print(
+            f"`fatigue-runner report {escape(str(results.out))} --debug` tries again", soft_wrap=True
+        )
+    else:
+        console.print(f"report: {escape(str(results.out / 'report.html'))}", soft_wrap=True)
 
 
 def main() -> None:

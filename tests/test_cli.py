@@ -150,7 +150,7 @@ def test_help_shows_an_example(call):
     code, out, _ = call("--help")
     assert code == 0
     assert "fatigue-runner run campaigns/quickstart.yaml" in words(out)
-    for command in ("run", "report", "turbine", *cli.MOUNTED):
+    for command in ("run", *cli.MOUNTED):
         assert call(command, "--help")[0] == 0
         assert command in out
 

@@ -10,11 +10,10 @@ from typing import Annotated, Any
 
 import typer
 
-app = typer.Typer(
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
-    pretty_exceptions_enable=False,
-    help="Measure the kernel, every integrator's error over cost, the paper's experiment, the logs; each in one run.",
+from fatigue_runner.terminal import command_group, console
+
+app = command_group(
+    "Measure the kernel, every integrator's error over cost, the paper's experiment, the logs; each in one run."
 )
 
 Json = Annotated[
@@ -217,13 +216,11 @@ def logs(
 
         fatigue-runner benchmark logs
     """
-    from rich.console import Console
-
     from fatigue_runner.benchmark.pages import tables
     from fatigue_runner.benchmark.speed import logs as measured
 
     result = measured.measure(rows, repeats)
-    Console().print(tables.logs(result))
+    console().print(tables.logs(result))
     _write(result, json)
 
 
@@ -242,13 +239,9 @@ def live(
 
         fatigue-runner benchmark live --json live.json
     """
-    from rich.console import Console
-
     from fatigue_runner.benchmark.pages import tables
     from fatigue_runner.benchmark.speed import live as measured
 
     result = measured.measure(rounds, duration, at_once=at_once, say=_say)
-    console = Console()
-    console.width = max(console.width, 110)
-    console.print(tables.live(result))
+    console(110).print(tables.live(result))
     _write(result, json)

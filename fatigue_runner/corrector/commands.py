@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(no_args_is_help=True, help="Trained correctors: what is there, and how good it is.")
+from fatigue_runner.terminal import command_group, console
+
+app = command_group("Trained correctors: what is there, and how good it is.")
 
 Folder = Annotated[
     Path | None, typer.Option("--folder", "-f", help="Also look in this folder, before the shipped ones.")
@@ -22,7 +24,6 @@ def list_correctors(folder: Folder = None) -> None:
 
         fatigue-runner correctors list
     """
-    from rich.console import Console
     from rich.table import Table
 
     from fatigue_runner.corrector import library
@@ -39,13 +40,12 @@ def list_correctors(folder: Folder = None) -> None:
             for key in ("nrmse_plain", "nrmse_enhanced", "nrmse_hybrid")
         ]
         table.add_row(c.name, c.family, c.turbine, c.method, f"{c.step * 1e3:g}", *errors)
-    console = Console(highlight=False)
-    console = console if console.is_terminal else Console(highlight=False, width=120)
     if not found:
         typer.echo("no correctors found; train one with `fatigue-runner train RECIPE`")
         return
-    console.print(table)
-    console.print(
+    to = console()
+    to.print(table)
+    to.print(
         "plain, enhanced, hybrid: median NRMSE over winds that were not trained on; - : diverged or not measured"
     )
 

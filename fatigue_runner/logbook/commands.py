@@ -18,13 +18,9 @@ from fatigue_runner.logbook.export import export as export_log
 from fatigue_runner.logbook.reader import number
 from fatigue_runner.logbook.recovery import recover as recover_log
 from fatigue_runner.logbook.summary import LogSummary, summarise
+from fatigue_runner.terminal import command_group
 
-app = typer.Typer(
-    no_args_is_help=True,
-    rich_markup_mode="markdown",
-    pretty_exceptions_enable=False,
-    help="Look into the logs of a run: what ran, whether the file is whole, repair it, export it.",
-)
+app = command_group("Look into the logs of a run: what ran, whether the file is whole, repair it, export it.")
 
 LogPath = Annotated[Path, typer.Argument(help="A log (.mcap).", show_default=False)]
 # Stretches of rejected steps that `info` lists; the longest tell most.

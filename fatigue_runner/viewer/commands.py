@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(pretty_exceptions_enable=False, rich_markup_mode="markdown")
+from fatigue_runner.terminal import command_group
+
+app = command_group()
 
 
 @app.command()

@@ -1,0 +1,101 @@
+"""`fatigue-runner train`: a corrector from its recipe, with a line of progress."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from fatigue_runner.terminal import command_group, console
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+app = command_group()
+
+
+@app.command()
+def train(
+    recipe: Annotated[
+        Path, typer.Argument(metavar="RECIPE", help="The recipe's YAML file.", show_default=False)
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder of the result; default: the recipe's.")
+    ] = None,
+    step: Annotated[float | None, typer.Option("--step", help="Another step [s] than the recipe's.")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", help="Another seed than the recipe's.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Another name than the recipe's.")] = None,
+    tune: Annotated[
+        int, typer.Option("--tune", min=0, help="Networks: first search with this many Optuna trials.")
+    ] = 0,
+    tune_epochs: Annotated[int, typer.Option("--tune-epochs", min=1, help="Epochs of a trial.")] = 100,
+) -> None:
+    """Train a corrector: NAME.safetensors and its card NAME.md beside the recipe.
+
+    Affine ones take seconds. A network's training can be stopped with Ctrl-C: the same command goes on.
+
+    Examples:
+
+        fatigue-runner train correctors/rk4-100ms.yaml
+
+        fatigue-runner train correctors/rk4-100ms.yaml --step 0.08 --name rk4-80ms --out runs
+    """
+    from fatigue_runner.integrators.initial import initial_state
+
+    to = console()
+    overrides: dict[str, Any] = {"step": step, "seed": seed, "name": name}
+    if tune:
+        settings = _tune(recipe, out, initial_state, overrides, tune, tune_epochs, to)
+        if settings is None:
+            raise typer.Exit(130)
+        overrides |= {"training": settings, "seed": None}
+    _train(recipe, out, initial_state, overrides, to)
+
+
+def _train(recipe: Any, out: Any, initial_state: Any, overrides: dict[str, Any], console: Console) -> None:
+    """Train a recipe with a line of progress; a network's training can be stopped and goes on from its checkpoint."""
+    from fatigue_runner.corrector.card import validation_rows
+    from fatigue_runner.corrector.recipes import train_file
+
+    with console.status("making the samples") as status:
+
+        def epoch(at: dict[str, float]) -> None:
+            status.update(
+                f"epoch {at['epoch']:.0f}/{at['epochs']:.0f}: validation {at['validation']:.3e}, best {at['best']:.3e} (Ctrl-C ends)"
+            )
+
+        checkpoint = (out or recipe.parent) / f".{overrides.get('name') or recipe.stem}.checkpoint"
+        made = train_file(recipe, out, initial_state, overrides, status.update, epoch, checkpoint)
+    if checkpoint.exists():
+        epochs = made.corrector.training["epochs"]
+        console.print(f"stopped after {epochs} epochs: the best so far is written, the same command goes on")
+    for label, value in validation_rows(made.corrector)[:7]:
+        console.print(f"{label}: {value}")
+    console.print(f"corrector: {made.path}\ncard: {made.card}")
+
+
+def _tune(
+    recipe: Any,
+    out: Any,
+    initial_state: Any,
+    overrides: dict[str, Any],
+    trials: int,
+    epochs: int,
+    console: Console,
+) -> dict[str, Any] | None:
+    """Search for a network's settings, a line per trial; None where Ctrl-C ended it: the same command goes on."""
+    from fatigue_runner.corrector.training_recipe import tune_file
+
+    def trial(report: Any) -> None:
+        value = "-" if report.value is None else f"{report.value:.3e}"
+        settings = ", ".join(
+            f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in report.settings.items()
+        )
+        console.print(f"trial {report.number}: {report.state}, validation {value}; {settings}")
+
+    storage = (out or recipe.parent) / f".{overrides.get('name') or recipe.stem}.tuning.db"
+    with console.status(f"{trials} trials of {epochs} epochs (Ctrl-C ends, the same command goes on)"):
+        settings, stopped = tune_file(recipe, storage, initial_state, trials, epochs, overrides, trial)
+    console.print("best: " + ", ".join(f"{k}: {v}" for k, v in settings.items()))
+    return None if stopped else settings

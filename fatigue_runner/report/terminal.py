@@ -1,0 +1,96 @@
+"""The answer of a results table in the terminal: which integrator is good enough, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from fatigue_runner.channels import BY_NAME
+from fatigue_runner.report.cells import Row, format_percent, numbers
+from fatigue_runner.report.ranking import (
+    LEVELS,
+    MethodSummary,
+    answer,
+    fatigue_columns,
+    integrator_key,
+    rank,
+    unseen_winds,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+
+def print_ranking(rows: Sequence[Row], console: Console) -> None:
+    """A table of the integrators and the answer in words."""
+    from rich.markup import escape
+
+    summaries = rank(rows)
+    console.print(_table(rows, summaries, console))
+    for sentence in [*answer(summaries), *unseen_winds(summaries)]:
+        console.print(escape(sentence))
+
+
+def _table(rows: Sequence[Row], summaries: Sequence[MethodSummary], console: Console) -> Table:
+    """Integrators, cheapest first; a narrow terminal gets one column for the worst of all channels."""
+    from rich import box
+    from rich.table import Table
+
+    fatigue = fatigue_columns(rows)
+    channels = list(dict.fromkeys(channel for channel, _, _ in fatigue))
+    labels = {channel: BY_NAME[channel].label.removesuffix(" moment") for channel in channels}
+    groups = {label.replace("blade ", "blade\u00a0"): [channel] for channel, label in labels.items()}
+    longest = max((len(summary.label) for summary in summaries), default=0)
+    if 46 + max(20, longest) + 12 * len(groups) > console.width:
+        groups = {"DEL error": channels}
+    table = Table(
+        box=box.SIMPLE_HEAD, title="Integrators, cheapest first; DEL errors in %", title_justify="left"
+    )
+    # a long name may wrap, a figure must not
+    table.add_column("integrator", vertical="bottom", min_width=min(longest, 24))
+    for heading in ("evals per s", "wall ms per s", "NRMSE median", "NRMSE worst"):
+        table.add_column(heading.replace(" ", "\n"), justify="right", no_wrap=True)
+    for heading in groups:
+        table.add_column(heading.replace(" ", "\n"), justify="right", no_wrap=True)
+    table.add_column("DEL\nerror", no_wrap=True)
+    for summary in summaries:
+        wall_time = summary.wall_time_per_second
+        table.add_row(
+            summary.label,
+            _figure(summary.evaluations_per_second, "{:.0f}"),
+            _figure(None if wall_time is None else wall_time * 1e3, "{:.3g}"),
+            _figure(summary.nrmse_median, "{:.1e}"),
+            _figure(summary.nrmse_worst, "{:.1e}"),
+            *(_worst_error(rows, summary, fatigue, group) for group in groups.values()),
+            _verdict(summary),
+        )
+    table.caption = (
+        "evaluations and wall time per simulated second; DEL errors: worst over winds and exponents"
+    )
+    table.caption_justify = "left"
+    return table
+
+
+def _worst_error(rows: Sequence[Row], summary: MethodSummary, fatigue: Any, channels: Sequence[str]) -> str:
+    rows = [row for row in rows if integrator_key(row) == summary.key and row["status"] == "done"]
+    columns = [f"del_error_{suffix}" for channel, _, suffix in fatigue if channel in channels]
+    errors = [100 * abs(error) for column in columns for error in numbers(rows, column)]
+    if not errors:
+        return ""
+    return f"{max(errors):.2g}" if max(errors) >= 1e-3 else "< 0.001"
+
+
+def _figure(value: float | None, form: str) -> str:
+    return "" if value is None else form.format(value)
+
+
+def _verdict(summary: MethodSummary) -> str:
+    if not summary.complete:
+        return f"[red]{summary.cases - summary.done} of {summary.cases} lost[/]"
+    if summary.is_reference:
+        return "reference"
+    if summary.worst_del_error is None:
+        return "not compared"
+    met = [level for level in LEVELS if summary.worst_del_error.size <= level]
+    return f"[green]≤ {format_percent(min(met))}[/]" if met else f"> {format_percent(max(LEVELS))}"
