@@ -78,6 +78,7 @@ def build_world(monkeypatch: Any) -> World:
     integrators.stability_limit = lambda turbine, method: 0.2  # type: ignore[attr-defined]
     integrators.warm_up = lambda: None  # type: ignore[attr-defined]
     turbines = types.ModuleType("fatigue_runner.turbine")
+    turbines.__path__ = [str(Path(fatigue_runner.__file__).parent / "turbine")]
     turbines.load_turbine = lambda name: turbine  # type: ignore[attr-defined]
     for name, module in (("integrators", integrators), ("turbine", turbines)):
         monkeypatch.setitem(sys.modules, f"fatigue_runner.{name}", module)
