@@ -5,9 +5,13 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import joblib
 import pytest
+
+if TYPE_CHECKING:
+    from fatigue_runner.turbine import Turbine
 
 # More do not pay: every process loads the kernels anew, and campaigns under test start workers of their own.
 MOST_PROCESSES = 4
@@ -36,3 +40,21 @@ def compile_kernels(say: Callable[[str], None]) -> None:
     code = "from fatigue_runner.integrators import METHODS, warm_up\nfor name in METHODS: warm_up(name)"
     if subprocess.run([sys.executable, "-c", code]).returncode == 0 and done.parent.is_dir():
         done.touch()
+
+
+@pytest.fixture(scope="session")
+def nrel5mw() -> Turbine:
+    """The real turbine, with tilt and cone. Tests only read it."""
+    return _shipped_turbine("nrel5mw")
+
+
+@pytest.fixture(scope="session")
+def t2b1i1cg() -> Turbine:
+    """The paper's turbine, without tilt and cone. Tests only read it."""
+    return _shipped_turbine("t2b1i1cg")
+
+
+def _shipped_turbine(name: str) -> Turbine:
+    from fatigue_runner.turbine import load_turbine  # loads the compiler, which many tests do without
+
+    return load_turbine(name)

@@ -235,11 +235,10 @@ def test_samples_that_are_no_numbers_teach_nothing():
 
 
 @pytest.fixture(scope="module")
-def turbine_samples():
-    from fatigue_runner.turbine import load_turbine
+def turbine_samples(t2b1i1cg):
     from fatigue_runner.wind import ConstantWind
 
-    turbine = load_turbine("t2b1i1cg")
+    turbine = t2b1i1cg
     winds = [ConstantWind(7.0), ConstantWind(8.0)]
     initial = np.array([turbine.operating_point(w.mean_speed) for w in winds])
     return along_trajectories(turbine, "heun", 0.01, winds, initial, 0.5, perturbed=1), initial

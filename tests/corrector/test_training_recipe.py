@@ -17,7 +17,6 @@ from fatigue_runner.corrector import artefact
 from fatigue_runner.corrector.training_recipe import parse_recipe, read_recipe, sample_sets, train_recipe
 from fatigue_runner.integrators import simulate_block
 from fatigue_runner.integrators.initial import initial_state
-from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind
 
 TINY = {
@@ -31,8 +30,8 @@ TINY = {
 
 
 @pytest.fixture(scope="module")
-def turbine():
-    return load_turbine("t2b1i1cg")
+def turbine(t2b1i1cg):
+    return t2b1i1cg
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,6 @@ from fatigue_runner.integrators.exponential import ExponentialRungeKutta
 from fatigue_runner.integrators.exponential_adams import ExponentialAdams
 from fatigue_runner.integrators.multistep import LinearMultistep
 from fatigue_runner.integrators.output import hermite_weights
-from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.generated.kernel import LANES
 from fatigue_runner.wind import ConstantWind, StepWind, TurbulentWind
 
@@ -22,11 +21,6 @@ DURATION = 2.4
 @pytest.fixture(scope="module")
 def smooth():
     return smooth_turbine()
-
-
-@pytest.fixture(scope="module")
-def turbine():
-    return load_turbine("nrel5mw")
 
 
 @pytest.fixture(scope="module")

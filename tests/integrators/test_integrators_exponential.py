@@ -8,13 +8,7 @@ from scipy.linalg import expm
 
 from fatigue_runner.integrators import simulate_block, stability_limit
 from fatigue_runner.integrators.exponential import linear_part, phi_functions
-from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind, TurbulentWind
-
-
-@pytest.fixture(scope="module")
-def turbine():
-    return load_turbine("nrel5mw")
 
 
 def test_phi_functions_are_those_of_the_scalar_formulas():

@@ -17,11 +17,6 @@ from fatigue_runner.wind import ConstantWind, TurbulentWind
 CLASSICAL = [n for n in METHODS if isinstance(method(n), ButcherTableau | LinearMultistep)]
 
 
-@pytest.fixture(scope="module")
-def turbine():
-    return load_turbine("nrel5mw")
-
-
 def constant(degrees: float, duration: float = 10.0) -> fr.PitchSeries:
     return fr.PitchSeries(np.linspace(0, duration, 11), np.full(11, np.radians(degrees)))
 
