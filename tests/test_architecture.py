@@ -15,7 +15,18 @@ import fatigue_runner
 PACKAGE = Path(fatigue_runner.__file__).parent
 
 # Plain results, names, errors: everyone may use them, and they use nothing but each other.
-FLOOR = {"errors", "channels", "naming", "trajectory", "accuracy", "compiled", "terminal", "shipped", "rotor", "_version"}
+FLOOR = {
+    "errors",
+    "channels",
+    "naming",
+    "trajectory",
+    "accuracy",
+    "compiled",
+    "terminal",
+    "shipped",
+    "rotor",
+    "_version",
+}
 
 # Which rooms a room may import. A new room is one line here.
 MAY_IMPORT = {
