@@ -95,7 +95,7 @@ def serve(recording: Path, port: int, say: Callable[[str], Any] = print) -> None
     require_free(port)
     data_port = free_port()
     with viewer(
-        recording, "--serve-web", "--port", str(data_port), "--web-viewer-port", str(port), windowed=False
+        recording, "--serve-web", "--port", str(data_port), "--web-viewer-port", str(port)
     ) as process:
         _wait_until_served(process, port)
         say(f"open {page_address(port, data_port)} in a browser on this machine; Ctrl-C ends")
@@ -109,7 +109,7 @@ def page_address(port: int, data_port: int) -> str:
 
 
 @contextmanager
-def viewer(*arguments: str | Path, windowed: bool = True) -> Iterator[subprocess.Popen[bytes]]:
+def viewer(*arguments: str | Path) -> Iterator[subprocess.Popen[bytes]]:
     """A viewer process on the loopback interface, ended with the block. Its own chatter is kept from the user."""
     process = start_viewer(*arguments)
     try:

@@ -10,11 +10,11 @@ disc. Every module of this folder is imported here, so a new source is one new f
 from importlib import import_module
 from pkgutil import iter_modules
 
-from fatigue_runner.wind.cells import stack_cells
 from fatigue_runner.wind.constant import ConstantWind
 from fatigue_runner.wind.from_file import read_wind_file
 from fatigue_runner.wind.series import SeriesWind
 from fatigue_runner.wind.source import SOURCES, WindSource, make_wind
+from fatigue_runner.wind.stack import stack_cells
 from fatigue_runner.wind.steps import StepWind
 from fatigue_runner.wind.turbulence import TurbulentWind
 

@@ -7,16 +7,8 @@ On cell i = min(int(t / cell_duration + 1e-9), n_cells - 1), with u = t - i * ce
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-from fatigue_runner.channels import WIND_NAMES
-from fatigue_runner.errors import InputError
-
-if TYPE_CHECKING:
-    from fatigue_runner.wind.source import WindSource
 
 # A duration of n cells must not need cell n + 1, nor a time on a step fall before it, because of a rounded
 # quotient (0.3 / 0.1 = 2.9999999999999996).
@@ -48,30 +40,3 @@ def minimum(cell_duration: float, cubics: np.ndarray) -> tuple[float, float]:
     values = ((c3 * u + c2) * u + c1) * u + c0
     candidate, cell = np.unravel_index(np.argmin(values), values.shape)
     return float(values[candidate, cell]), float(cell * cell_duration + u[candidate, cell])
-
-
-def stack_cells(winds: Sequence[WindSource], duration: float) -> tuple[float, np.ndarray]:
-    """The cells of a block: (cell_duration [s], coefficients (n_cells, 4, n_signals, n_winds)).
-
-    Winds with `cell_key` None are constant and fit any grid with the same bits; the others must have one and
-    the same key (group the cases by it). Grids are never refined to a common one: a case's bits must not
-    depend on its neighbours. Raises InputError for differing keys or where a wind is shorter than `duration`.
-    """
-    if not winds:
-        raise InputError("a block needs at least one wind; the list of winds is empty")
-    keys = sorted({w.cell_key for w in winds if w.cell_key is not None})
-    if len(keys) > 1:
-        grids = ", ".join(f"{key:g} s" for key in keys)
-        raise InputError(
-            f"winds of one block have different cell durations ({grids}); "
-            "give each its own block (group by cell_key), or give them one time step"
-        )
-    parts = [w.cells(duration) for w in winds]
-    if keys:
-        cell_duration, n_cells = keys[0], cell_count(duration, keys[0])
-    else:
-        cell_duration, n_cells = parts[0][0], 1
-    stacked = np.zeros((n_cells, 4, len(WIND_NAMES), len(winds)))
-    for lane, (_, coefficients) in enumerate(parts):
-        stacked[..., lane] = coefficients  # a constant's single cell repeats over the grid
-    return cell_duration, stacked
