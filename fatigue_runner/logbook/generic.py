@@ -10,10 +10,11 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import DecodeError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
+from mcap.well_known import MessageEncoding
+from mcap_protobuf.decoder import DecoderFactory
 
 from fatigue_runner.logbook.contents import Contents
 from fatigue_runner.logbook.errors import LogError
@@ -25,21 +26,11 @@ Tables = dict[str, dict[str, np.ndarray]]
 
 
 def message_class(schema: Schema) -> Any:
-    """The protobuf class of an MCAP schema record; files in the set may come in any order."""
-    files = {f.name: f for f in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file}
-    pool = descriptor_pool.DescriptorPool()
-    added: set[str] = set()
-
-    def add(name: str) -> None:
-        if name in files and name not in added:
-            added.add(name)
-            for dependency in files[name].dependency:
-                add(dependency)
-            pool.Add(files[name])
-
-    for name in files:
-        add(name)
-    return message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
+    """The protobuf class of an MCAP schema record. Raises McapError where the record does not hold it."""
+    decode = DecoderFactory().decoder_for(MessageEncoding.Protobuf, schema)
+    if decode is None:
+        raise LogError(f"schema {schema.name!r} is written in {schema.encoding!r}; it must be protobuf")
+    return type(decode(b""))
 
 
 class _Column:

@@ -119,6 +119,12 @@ def test_a_topic_of_ours_in_another_encoding_is_refused(tmp_path):
         read_log(path)
 
 
+def test_a_topic_of_ours_whose_schema_is_no_protobuf_is_refused(tmp_path):
+    path = _write_foreign(tmp_path / "a.mcap", "/wind", "protobuf")
+    with pytest.raises(LogError, match="schema 'x' is written in 'jsonschema'; it must be protobuf"):
+        read_log(path)
+
+
 def test_a_field_of_a_later_version_is_kept_or_ignored_but_never_mistaken(tmp_path, monkeypatch):
     """A load that only the writer knows: this program reads the rest to the bit."""
     later = replace(
