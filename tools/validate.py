@@ -16,7 +16,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from fatigue_runner.integrators import simulate_block
+from fatigue_runner.integrators import Ensemble, Integrator, simulate
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.aerodynamics import power_coefficient, thrust_coefficient
 from fatigue_runner.turbine.beam import blade_modes, tower_modes
@@ -92,7 +92,8 @@ def operation() -> Iterator[Check]:
     for name, values in published.items():
         turbine = load_turbine(name)
         start = turbine.operating_point(8.0)[None]
-        run = simulate_block(turbine, "dop853", 0.05, [ConstantWind(8.0)], start, 300.0, 0.05)[0]
+        ensemble = Ensemble(turbine, [ConstantWind(8.0)], start, 300.0, 0.05)
+        run = simulate(ensemble, Integrator("dop853", 0.05))[0]
         late = run.time >= 200.0
         mean = {k: v[late].mean() for k, v in run.loads.items()}
         ours = (
@@ -134,7 +135,7 @@ def equations() -> Iterator[tuple[str, str, str]]:
     worst = (np.abs(turbine.rhs(x.T, 8.0)[8:].T - expected) / (1 + np.abs(expected))).max()
     yield "accelerations in violent states", "a second formulation without frames", f"{worst:.0e} relative"
     drift = 0.0
-    for run in simulate_block(turbine, "rk7", 0.005, [ConstantWind(8.0)] * 8, x, 100.0, 10.0):
+    for run in simulate(Ensemble(turbine, [ConstantWind(8.0)] * 8, x, 100.0, 10.0), Integrator("rk7", 0.005)):
         energy = np.array([model.energy(row) for row in run.state])
         drift = max(drift, np.ptp(energy) / (0.5 * 3.5e7 * run.state[0, 14] ** 2))
     yield (
@@ -162,7 +163,8 @@ def equations() -> Iterator[tuple[str, str, str]]:
         f"{np.median(rms):.1f} % rms, at most {rms.max():.1f} %",
     )
     winds = [ConstantWind(float(v)) for v in reference["vwind"]]
-    runs = simulate_block(other, "rk7", 0.005, winds, reference["V2"][:, 0], 20.0, 0.05)
+    ensemble = Ensemble(other, winds, reference["V2"][:, 0], 20.0, 0.05)
+    runs = simulate(ensemble, Integrator("rk7", 0.005))
     errors = np.array(
         [
             100 * np.sqrt(((run.state - v) ** 2).mean(axis=0)) / np.ptp(v, axis=0)
