@@ -8,14 +8,14 @@ logs, counting, resuming.
 from __future__ import annotations
 
 import dataclasses
-import sys
 import types
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import fatigue_runner
+from fatigue_runner import integrators
+from fatigue_runner import turbine as turbines
 from fatigue_runner.channels import LOAD_NAMES, STATE_NAMES
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.trajectory import Trajectory
@@ -48,41 +48,21 @@ def build_world(monkeypatch: Any) -> World:
         operating_point=lambda speed, *shears, pitch: np.full(len(STATE_NAMES), 0.1 * speed),
     )
 
-    def simulate_block(
-        turbine,
-        method,
-        step,
-        winds,
-        initial,
-        duration,
-        output_step,
-        pitch=0.0,
-        corrector=None,
-        mode="enhanced",
-    ):
-        world.calls.append((method, step, [wind.mean_speed for wind in winds]))
+    def simulate(ensemble, integrator):
+        method = integrator.method
+        world.calls.append((method, integrator.step, [wind.mean_speed for wind in ensemble.winds]))
         if method in world.raising:
             raise world.raising[method]
+        ends = [world.diverging.get((method, wind.mean_speed)) for wind in ensemble.winds]
         return [
-            _sine(
-                method, step, wind, x, duration, output_step, world.diverging.get((method, wind.mean_speed))
-            )
-            for wind, x in zip(winds, initial, strict=True)
+            _sine(method, integrator.step, wind, x, ensemble.duration, ensemble.output_step, end)
+            for wind, x, end in zip(ensemble.winds, ensemble.initial, ends, strict=True)
         ]
 
-    integrators = types.ModuleType("fatigue_runner.integrators")
-    # its modules beside the loops, such as `pitch`, are the real ones
-    integrators.__path__ = [str(Path(fatigue_runner.__file__).parent / "integrators")]
-    integrators.METHODS = dict(ORDERS)  # type: ignore[attr-defined]
-    integrators.simulate_block = simulate_block  # type: ignore[attr-defined]
-    integrators.stability_limit = lambda turbine, method: 0.2  # type: ignore[attr-defined]
-    integrators.warm_up = lambda: None  # type: ignore[attr-defined]
-    turbines = types.ModuleType("fatigue_runner.turbine")
-    turbines.__path__ = [str(Path(fatigue_runner.__file__).parent / "turbine")]
-    turbines.load_turbine = lambda name: turbine  # type: ignore[attr-defined]
-    for name, module in (("integrators", integrators), ("turbine", turbines)):
-        monkeypatch.setitem(sys.modules, f"fatigue_runner.{name}", module)
-        monkeypatch.setattr(fatigue_runner, name, module, raising=False)
+    monkeypatch.setattr(integrators, "simulate", simulate)
+    monkeypatch.setattr(integrators, "stability_limit", lambda turbine, method: 0.2)
+    monkeypatch.setattr(integrators, "warm_up", lambda: None)
+    monkeypatch.setattr(turbines, "load_turbine", lambda name: turbine)
     from fatigue_runner.campaign import block, run
 
     # the toy's reference is exact, and its calls are counted

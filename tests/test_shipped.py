@@ -16,8 +16,8 @@ from places import CAMPAIGNS, CORRECTORS, ROOT, TURBINE_DATA
 
 import fatigue_runner
 from fatigue_runner import shipped
+from fatigue_runner.campaign.spec import campaign_source
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.source import read_source
 
 
 def test_a_checkout_ships_the_folders_at_its_top():
@@ -27,15 +27,15 @@ def test_a_checkout_ships_the_folders_at_its_top():
 
 def test_a_bare_name_is_a_shipped_campaign_unless_a_file_is_called_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert read_source("quickstart").data["name"] == "quickstart"
+    assert campaign_source("quickstart").data["name"] == "quickstart"
     (tmp_path / "quickstart").write_text("name: mine\n")
-    assert read_source("quickstart").data["name"] == "mine"
+    assert campaign_source("quickstart").data["name"] == "mine"
 
 
 def test_an_unknown_name_is_told_the_nearest(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InputError, match="no shipped campaign 'quikstart'; did you mean 'quickstart'"):
-        read_source("quikstart")
+        campaign_source("quikstart")
 
 
 def test_the_version_stands_in_one_place():

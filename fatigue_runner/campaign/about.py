@@ -1,4 +1,4 @@
-"""What ran, with which versions, on which machine: the facts that logs and the run folder carry."""
+"""What logs and the run folder say of a run: the facts (versions, machine), the whole campaign and the turbine as YAML."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from fatigue_runner._version import __version__
+from fatigue_runner.campaign.provenance import LIBRARIES
+from fatigue_runner.campaign.resolve import Resolved
+from fatigue_runner.campaign.spec import IntegratorSection
+from fatigue_runner.inputs.files import to_yaml
+from fatigue_runner.inputs.source import Place
 
-LIBRARIES = ("numpy", "scipy", "numba")
 
-
-def about(campaign: str, turbine: Any) -> dict[str, str]:
+def about(resolved: Resolved) -> dict[str, str]:
     """Facts by name, as text: campaign, turbine, turbine_hash, versions, machine."""
     versions = [f"fatigue-runner {__version__}", *(f"{name} {metadata.version(name)}" for name in LIBRARIES)]
     return {
-        "campaign": campaign,
-        "turbine": turbine.name,
-        "turbine_hash": turbine.hash,
+        "campaign": resolved.campaign.name,
+        "turbine": resolved.turbine.name,
+        "turbine_hash": resolved.turbine.hash,
         "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
         "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.system()}",
     }
@@ -32,3 +35,41 @@ def _processor() -> str:
         return platform.processor() or platform.machine()
     named = (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
     return next(named, platform.machine())
+
+
+def resolved_yaml(resolved: Resolved) -> str:
+    """The campaign with every default written out, as YAML that can be run again from anywhere."""
+    data = resolved.campaign.model_dump(exclude={"wind", "integrators", "reference"})
+    data["turbine"] = resolved.turbine_source
+    data["wind"] = resolved.campaign.wind.resolved(Place(resolved.source, ("wind",)))
+    files = {found.path: found.file for found in resolved.integrations}
+    data["integrators"] = [
+        _resolved_integrator(item, files[("integrators", index)])
+        for index, item in enumerate(resolved.campaign.integrators)
+    ]
+    data["reference"] = (
+        None if resolved.campaign.reference is None else resolved.campaign.reference.model_dump()
+    )
+    return to_yaml("The campaign of this run folder, with every default written out.", data)
+
+
+def turbine_yaml(resolved: Resolved) -> str:
+    """The turbine's file with what it is based on; of its aerodynamic tables the name only, their content is in the hash."""
+    from fatigue_runner.turbine.parameters import read_turbine_file
+
+    data = read_turbine_file(resolved.turbine_source)
+    aero = data.get("aerodynamics", {})
+    data["aerodynamics"] = aero | {key: Path(aero[key]).name for key in ("tables", "airfoils") if key in aero}
+    return to_yaml(f"The turbine of this run, hash {resolved.turbine.hash}.", data)
+
+
+def _resolved_integrator(item: IntegratorSection, file: str) -> dict[str, Any]:
+    if item.corrector is None:
+        return dict(_without_none(item.model_dump(exclude={"mode"})))
+    return {**_without_none(item.model_dump()), "corrector": file}
+
+
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list) else value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.campaign.cases import Case, Integration
+from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.evaluate import (
     DESCRIPTION,
     Evaluated,
@@ -20,6 +19,7 @@ from fatigue_runner.campaign.evaluate import (
     make_row,
     scaled_error,
 )
+from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.trajectory import Trajectory
@@ -132,31 +132,15 @@ def simulate(
     setup: Setup, integration: Integration, winds: Sequence[Any], initial: np.ndarray
 ) -> list[Trajectory]:
     """All winds of a block with one integrator, from the states (n, 16)."""
-    from fatigue_runner.integrators import simulate_block
+    from fatigue_runner import integrators
 
     campaign = setup.campaign
-    return simulate_block(
-        _turbine(setup.turbine, setup.turbine_hash),
-        integration.method,
-        integration.step,
-        list(winds),
-        initial,
-        campaign.duration,
-        1.0 / campaign.output_rate,
-        pitch=campaign.blade_pitch,
-        corrector=_corrector(integration.file, integration.digest) if integration.file else None,
-        mode=integration.mode or "enhanced",
+    turbine = _turbine(setup.turbine, setup.turbine_hash)
+    output_step = 1.0 / campaign.output_rate
+    ensemble = integrators.Ensemble(
+        turbine, winds, initial, campaign.duration, output_step, campaign.blade_pitch
     )
-
-
-@functools.lru_cache(maxsize=16)
-def _corrector(file: str, digest: str) -> Any:
-    """The corrector, read once per worker; refused where its file is not the one that the cases were made for."""
-    from fatigue_runner.corrector import load
-
-    if hashlib.sha256(Path(file).read_bytes()).hexdigest() != digest:
-        raise FatigueRunnerError(f"corrector {file} changed while the campaign ran; run it again")
-    return load(file)
+    return integrators.simulate(ensemble, integration.build())
 
 
 @functools.lru_cache(maxsize=4)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from fatigue_runner.campaign.cases import Case
+from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.results import columns, fatigue_keys, known
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.errors import FatigueRunnerError
@@ -133,16 +133,18 @@ def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
         "wind_speed": known(label["wind_speed"]),
         "pitch_deg": campaign.pitch if isinstance(campaign.pitch, float) else None,
         **{name: known(label.get(name)) for name in names},
-        **_trained(case.integration.file, case.integration.digest),
+        **_trained(case.integration),
     }
 
 
-@lru_cache
-def _trained(file: str, digest: str) -> dict[str, float]:
-    """The mean wind speeds [m/s] that a case's corrector was trained on; digest: that of its file, which may change."""
-    from fatigue_runner.corrector import load
-
-    return dict(zip(("trained_from", "trained_to"), load(file).wind_range, strict=True)) if file else {}
+def _trained(integration: Integration) -> dict[str, float]:
+    """The mean wind speeds [m/s] that a case's corrector was trained on."""
+    corrector = integration.build().corrector if integration.file else None
+    return (
+        {}
+        if corrector is None
+        else dict(zip(("trained_from", "trained_to"), corrector.wind_range, strict=True))
+    )
 
 
 def _fatigue(campaign: Campaign) -> list[tuple[str, float, str]]:

@@ -8,9 +8,9 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fatigue_runner.campaign.about import about
+from fatigue_runner.campaign.about import about, resolved_yaml, turbine_yaml
 from fatigue_runner.campaign.block import Setup, run_block
-from fatigue_runner.campaign.plan import Plan, make_plan, resolved_yaml, turbine_yaml
+from fatigue_runner.campaign.plan import Plan, make_plan
 from fatigue_runner.campaign.pool import connect, run_jobs
 from fatigue_runner.campaign.results import Results, columns
 from fatigue_runner.campaign.store import Store
@@ -86,15 +86,15 @@ def _simulate(
     from fatigue_runner import integrators
 
     progress.say("checking the reference")
-    facts = about(plan.campaign.name, plan.turbine) | reference_facts(plan, store.earlier)
-    text = resolved_yaml(plan)
+    facts = about(plan.resolved) | reference_facts(plan, store.earlier)
+    text = resolved_yaml(plan.resolved)
     setup = Setup(
         plan.campaign,
-        plan.turbine_source,
-        plan.turbine.hash,
+        plan.resolved.turbine_source,
+        plan.resolved.turbine.hash,
         store.out.resolve() / "logs",
         facts,
-        {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan).encode()},
+        {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan.resolved).encode()},
     )
     store.open({"facts": facts, "campaign": plan.campaign.model_dump()}, text)
     try:

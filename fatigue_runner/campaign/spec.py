@@ -34,6 +34,8 @@ A sweep is a number, a list of numbers, {start, stop, step}, {start, stop, count
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import (
@@ -43,15 +45,15 @@ from pydantic import (
     PlainSerializer,
     PlainValidator,
     SerializeAsAny,
-    ValidationError,
     field_validator,
     model_validator,
 )
 
+from fatigue_runner import shipped
 from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import Section, input_error, problem
-from fatigue_runner.inputs.source import Source
+from fatigue_runner.inputs.section import Section, problem, validated
+from fatigue_runner.inputs.source import Source, read_mapping
 from fatigue_runner.inputs.sweep import Piece, Sweep, check_not_empty, expand
 from fatigue_runner.integrators.initial import INITIAL_STATES
 from fatigue_runner.wind.section import WindSection, wind_section
@@ -87,7 +89,7 @@ def _positive_steps(pieces: list[Piece]) -> list[Piece]:
     return pieces
 
 
-class Integrator(Section):
+class IntegratorSection(Section):
     """One method and the steps [s] it runs at; `steps` may be written for `step`."""
 
     synonyms: ClassVar = {"steps": "step"}
@@ -98,7 +100,7 @@ class Integrator(Section):
     mode: Literal["hybrid", "enhanced"] = "hybrid"
 
     @model_validator(mode="after")
-    def _mode_of_something(self) -> Integrator:
+    def _mode_of_something(self) -> IntegratorSection:
         if self.corrector is None and "mode" in self.model_fields_set:
             raise problem("means nothing without `corrector`; add one or remove it", key="mode")
         return self
@@ -200,7 +202,7 @@ class Campaign(Section):
     discard: float = Field(default=0.0, ge=0)
     workers: int = Field(default=2, ge=1, le=1024)
     wind: Annotated[SerializeAsAny[WindSection], PlainValidator(wind_section)]
-    integrators: Annotated[list[Integrator], BeforeValidator(check_not_empty)]
+    integrators: Annotated[list[IntegratorSection], BeforeValidator(check_not_empty)]
     reference: Reference | None = Reference()
     fatigue: Fatigue = Fatigue()
     log: Log = Log()
@@ -247,9 +249,28 @@ class Campaign(Section):
         return self
 
 
+def read_campaign(campaign: str | Path | Mapping[str, Any]) -> tuple[Campaign, Source]:
+    """A campaign file, a shipped campaign's name or a mapping, validated; raises InputError with "file:line" per problem."""
+    source = campaign_source(campaign)
+    for key in ("cases", "benchmark"):
+        if key in source.data:
+            raise InputError(
+                f"{source.where((key,))}: the key {key!r} makes it a benchmark's file; "
+                f"run it with `fatigue-runner benchmark work-precision {source.name}`"
+            )
+    return parse_campaign(source), source
+
+
+def campaign_source(campaign: str | Path | Mapping[str, Any]) -> Source:
+    """What the file holds; a bare word such as `quickstart` that is no file here names a shipped campaign."""
+    if not isinstance(campaign, Mapping):
+        path = Path(campaign)
+        if path.name == str(campaign) and not path.suffix and not path.exists():
+            path = shipped.campaign(path.name)
+        return read_mapping(path, "campaign", "name, duration, wind, integrators, ...")
+    return Source("campaign", campaign, what="campaign")
+
+
 def parse_campaign(source: Source) -> Campaign:
     """The validated campaign; raises InputError with one sentence and "file:line" per problem."""
-    try:
-        return Campaign.model_validate(source.data)
-    except ValidationError as error:
-        raise input_error(error, source) from None
+    return validated(Campaign, source)

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from fatigue_runner.campaign.evaluate import Evaluated, evaluate
 from fatigue_runner.campaign.plan import Plan
 from fatigue_runner.errors import FatigueRunnerError
@@ -51,7 +49,7 @@ def _measure(plan: Plan) -> dict[str, str]:
     name, step = reference.method, reference.step
     other = "rk7" if name == "dop853" else "dop853"
     # twice the step costs half; where that is not stable, half of it
-    second = 2 * step if 2 * step < 0.5 * stability_limit(plan.turbine, name) else step / 2
+    second = 2 * step if 2 * step < 0.5 * stability_limit(plan.resolved.turbine, name) else step / 2
     smallest, most = min(step, second), max(method(m).evaluations_per_step for m in (name, other))
     output = 1.0 / plan.campaign.output_rate
     length = min(LONGEST, max(EVALUATIONS * smallest / most, 20 * output))
@@ -73,26 +71,19 @@ class _Block:
     """The first winds of the campaign that can share a block, spread over it; `run` evaluates them up to `duration` [s]."""
 
     def __init__(self, plan: Plan, duration: float) -> None:
-        self.plan, self.duration = plan, duration
-        cases = list({case.wind.id: case.wind for case in plan.cases}.values())
-        key = plan.cell_keys[cases[0].id]
-        cases = [case for case in cases if plan.cell_keys[case.id] == key]
-        self.cases = cases[:: max(1, len(cases) // WINDS)][:WINDS]
-        self.winds = [case.build() for case in self.cases]
-        self.initial = np.stack([plan.initial[case.id] for case in self.cases])
+        winds = plan.resolved.winds
+        alike = [wind for wind in winds if wind.source.cell_key == winds[0].source.cell_key]
+        self.ensemble = plan.resolved.ensemble(alike[:: max(1, len(alike) // WINDS)][:WINDS], duration)
+        self.campaign = plan.campaign
 
     def run(self, method: str, step: float) -> list[Evaluated]:
-        from fatigue_runner.integrators import simulate_block
+        from fatigue_runner.integrators import Integrator, simulate
 
-        campaign = self.plan.campaign
-        runs = simulate_block(
-            self.plan.turbine, method, step, self.winds, self.initial, self.duration, 1.0 / campaign.output_rate,
-            pitch=campaign.blade_pitch,
-        )  # fmt: skip
+        runs = simulate(self.ensemble, Integrator(method, step))
         lost = [r.diverged_at for r in runs if r.diverged_at is not None]
         if lost:
             raise FatigueRunnerError(f"{method} at {step:g} s diverges at {min(lost):g} s")
-        return [evaluate(r, campaign) for r in runs]
+        return [evaluate(r, self.campaign) for r in runs]
 
 
 def _distance(test: Evaluated, reference: Evaluated) -> tuple[float, float]:

@@ -1,9 +1,11 @@
-"""Files that are whole or absent."""
+"""What is written: files that are whole or absent, and YAML that `source` reads again."""
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
+from typing import Any
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -14,3 +16,16 @@ def write_atomically(path: Path, content: bytes) -> None:
         file.flush()
         os.fsync(file.fileno())
     part.replace(path)
+
+
+def to_yaml(heading: str, data: dict[str, Any]) -> str:
+    """Plain data as YAML below a line of comment, in the order of the keys."""
+    from ruamel.yaml import YAML
+
+    text = io.StringIO()
+    text.write(f"# {heading}\n")
+    yaml: Any = YAML(typ="safe", pure=True)
+    yaml.sort_base_mapping_type_on_output = False
+    yaml.default_flow_style = None
+    yaml.dump(data, text)
+    return text.getvalue()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.source import Source
+
+M = TypeVar("M", bound=BaseModel)
 
 # Tags of pydantic's unions start with this, so that they cannot be taken for keys of the file.
 TAG = "~"
@@ -62,6 +64,14 @@ class Section(BaseModel):
     @classmethod
     def check_complete(cls, data: dict[str, Any]) -> None:
         """Where a section says in words of its own what is missing."""
+
+
+def validated(model: type[M], source: Source) -> M:
+    """The data of a source as a section; raises InputError with one sentence and "file:line" per problem."""
+    try:
+        return model.model_validate(source.data)
+    except ValidationError as error:
+        raise input_error(error, source) from None
 
 
 def input_error(error: ValidationError, source: Source) -> InputError:

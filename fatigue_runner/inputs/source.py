@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner import shipped
 from fatigue_runner.errors import InputError
 
 # Aliases (`&a`, `*a`) can nest into each other and grow without bound from a few bytes of text.
@@ -38,7 +37,7 @@ class Source:
     """
 
     def __init__(
-        self, name: str, data: Any, text: str = "", folder: Path | None = None, what: str = "campaign"
+        self, name: str, data: Any, text: str = "", folder: Path | None = None, what: str = "file"
     ) -> None:
         self.name, self.what = name, what
         self.text = text
@@ -112,24 +111,11 @@ class Source:
         return self._plain(value, (*path, name))
 
 
-def read_source(campaign: str | Path | Mapping[str, Any]) -> Source:
-    """Read a campaign YAML (1.2: `1e7` is a number, duplicate keys are refused) or take a mapping as it is.
-
-    A bare word such as `quickstart` that is no file here names a shipped campaign.
-    Raises InputError for a missing or unreadable file and for text that is not YAML, with its line.
-    """
-    if isinstance(campaign, Mapping):
-        return Source("campaign", campaign)
-    path = Path(campaign)
-    if path.name == str(campaign) and not path.suffix and not path.exists():
-        path = shipped.campaign(path.name)
-    return read_mapping(path, "campaign", "name, duration, wind, integrators, ...")
-
-
 def read_mapping(path: Path, what: str, keys: str) -> Source:
     """Read a YAML file that holds a mapping: `what` it is and its first `keys` stand in the messages.
 
-    Raises InputError as `read_source`.
+    YAML 1.2: `1e7` is a number, duplicate keys are refused. Raises InputError for a missing or unreadable file and for text that is
+    not YAML, with its line.
     """
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
@@ -169,7 +155,7 @@ def _yaml_problem(error: Any) -> str:
 
 
 def _nearby(path: Path) -> str:
-    """The campaign files that stand where the missing one was looked for."""
+    """The YAML files that stand where the missing one was looked for."""
     folder = path.parent
     names = sorted(str(folder / p.name) for p in folder.glob("*.y*ml")) if folder.is_dir() else []
     if not names:

@@ -15,7 +15,8 @@ from places import CAMPAIGNS
 
 import fatigue_runner as fr
 from fatigue_runner.campaign import run_campaign
-from fatigue_runner.campaign.plan import BLOCK_SIZE, make_plan, resolved_yaml
+from fatigue_runner.campaign.about import resolved_yaml
+from fatigue_runner.campaign.plan import BLOCK_SIZE, make_plan
 from fatigue_runner.channels import LOAD_NAMES
 from fatigue_runner.errors import InputError
 from fatigue_runner.logbook import read_log
@@ -119,7 +120,7 @@ def test_a_shipped_campaign_is_valid_and_its_resolved_form_means_the_same(path, 
     plan = make_plan(path)
     assert path.stem == plan.campaign.name.replace("-", "_")
     copy = tmp_path / "resolved.yaml"
-    copy.write_text(resolved_yaml(plan))
+    copy.write_text(resolved_yaml(plan.resolved))
     assert [case.hash for case in make_plan(copy).cases] == [case.hash for case in plan.cases]
 
 

@@ -223,15 +223,15 @@ def test_a_state_that_is_no_number_is_a_failure_with_its_time_never_a_figure(
 ):
     from fatigue_runner import integrators
 
-    simulate = integrators.simulate_block
+    simulate = integrators.simulate
 
-    def poisoned(turbine, method, *args, **kwargs):
-        trajectories = simulate(turbine, method, *args, **kwargs)
-        if method == "rk4":
+    def poisoned(ensemble, integrator):
+        trajectories = simulate(ensemble, integrator)
+        if integrator.method == "rk4":
             trajectories[1].state[200:, 3] = np.nan
         return trajectories
 
-    monkeypatch.setattr(integrators, "simulate_block", poisoned)
+    monkeypatch.setattr(integrators, "simulate", poisoned)
     (row,) = run_campaign(campaign, out).lost
     assert (row["case_id"], row["status"]) == ("v08.00_rk4_100ms", "failed")
     assert "no number from 4 s on" in row["error_message"]

@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fatigue_runner.campaign.spec import Campaign, parse_campaign
+from fatigue_runner.campaign.spec import Campaign, campaign_source, parse_campaign
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.source import read_source
 from fatigue_runner.inputs.sweep import Random, Range, expand
 
 MINIMAL = """\
@@ -32,7 +31,7 @@ ALIASES = "k0: &k0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
 def parse(folder: Path, text: str) -> Campaign:
     path = folder / "sweep.yaml"
     path.write_text(text)
-    return parse_campaign(read_source(path))
+    return parse_campaign(campaign_source(path))
 
 
 def refusal(folder: Path, text: str) -> str:
@@ -213,12 +212,12 @@ def test_all_problems_are_told_at_once_in_the_order_of_the_file(tmp_path):
 def test_a_missing_file_names_the_nearest_one(tmp_path):
     (tmp_path / "sweep.yaml").write_text(MINIMAL)
     with pytest.raises(InputError, match=r"sweeep\.yaml: no such file; did you mean .*sweep\.yaml"):
-        read_source(tmp_path / "sweeep.yaml")
+        campaign_source(tmp_path / "sweeep.yaml")
 
 
 def test_a_folder_is_no_campaign(tmp_path):
     with pytest.raises(InputError, match="is a folder"):
-        read_source(tmp_path)
+        campaign_source(tmp_path)
 
 
 def test_brackets_without_end_are_no_campaign(tmp_path):
@@ -227,7 +226,7 @@ def test_brackets_without_end_are_no_campaign(tmp_path):
 
 def test_a_mapping_needs_no_file_and_its_errors_name_the_key():
     with pytest.raises(InputError, match="campaign: unknown key 'sped' in wind; did you mean 'speeds'"):
-        parse_campaign(read_source({"name": "a", "duration": 1, "wind": {"sped": 8}, "integrators": []}))
+        parse_campaign(campaign_source({"name": "a", "duration": 1, "wind": {"sped": 8}, "integrators": []}))
 
 
 def test_a_range_holds_both_ends():
@@ -297,6 +296,6 @@ def test_no_text_ends_in_anything_but_a_campaign_or_an_input_error(tmp_path_fact
     path = tmp_path_factory.mktemp("any") / "any.yaml"
     path.write_text(text, encoding="utf-8", errors="surrogateescape")
     try:
-        parse_campaign(read_source(path))
+        parse_campaign(campaign_source(path))
     except InputError as error:
         assert str(error).startswith(str(path))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fatigue_runner.campaign.cases import realisations
+from fatigue_runner.campaign.resolve import resolve
 from fatigue_runner.campaign.spec import parse_campaign
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.source import Place, Source
@@ -65,10 +65,9 @@ def doubled():
 
 def test_a_new_source_reaches_a_campaign_without_an_edit_elsewhere(doubled):
     campaign, source = parse({"type": "doubled", "halves": [3, 4]})
-    turbine = load_turbine("t2b1i1cg")
-    found = realisations(campaign, turbine, source)
-    assert [wind.id for wind in found] == ["v06.00_doubled", "v08.00_doubled"]
-    assert [wind.build().mean_speed for wind in found] == [6.0, 8.0]
+    found = resolve(campaign, source).winds
+    assert [wind.named.id for wind in found] == ["v06.00_doubled", "v08.00_doubled"]
+    assert [wind.source.mean_speed for wind in found] == [6.0, 8.0]
     assert campaign.model_dump()["wind"] == {"type": "doubled", "halves": [3.0, 4.0], "veer": 0.0}
 
 

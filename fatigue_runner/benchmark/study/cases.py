@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from fatigue_runner.campaign.resolve import resolve
+from fatigue_runner.campaign.spec import campaign_source, parse_campaign
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import Section, input_error, problem
-from fatigue_runner.inputs.source import Source, read_source
+from fatigue_runner.inputs.section import Section, problem, validated
+from fatigue_runner.inputs.source import Source
 from fatigue_runner.inputs.sweep import Sweep, expand
 from fatigue_runner.integrators import Ensemble, Integrator
 from fatigue_runner.integrators.pitch import PitchSeries
@@ -127,16 +128,13 @@ REFERENCE = {"method": "dop853", "step": 0.005}
 
 def load(campaign: str | Path | Mapping[str, Any]) -> tuple[list[Cases], Settings]:
     """All sets of cases of a file or mapping, and how to run them. Raises InputError with "file:line" and what would be right."""
-    source = read_source(campaign)
+    source = campaign_source(campaign)
     sections = source.data.get("cases", [{}])
     if not isinstance(sections, list) or not sections or not all(isinstance(s, Mapping) for s in sections):
         raise InputError(
             f"{source.where(('cases',))}: cases must be a list of sections, each with its own winds"
         )
-    try:
-        settings = _File.model_validate(source.data).benchmark
-    except ValidationError as error:
-        raise input_error(error, source) from None
+    settings = validated(_File, source).benchmark
     found = []
     for number in range(len(sections)):
         path: tuple[str | int, ...] = ("cases", number) if "cases" in source.data else ()
@@ -150,11 +148,6 @@ def load(campaign: str | Path | Mapping[str, Any]) -> tuple[list[Cases], Setting
 
 
 def _cases(source: Source) -> Cases:
-    from fatigue_runner.campaign import checks
-    from fatigue_runner.campaign.cases import integrations, realisations
-    from fatigue_runner.campaign.spec import parse_campaign
-    from fatigue_runner.corrector import load as load_corrector
-
     listed = "integrators" in source.data
     source.data.setdefault("integrators", _ANY)
     source.data.setdefault("reference", REFERENCE)
@@ -167,18 +160,9 @@ def _cases(source: Source) -> Cases:
         raise InputError(
             f"{source.where(('pitch',))}: a benchmark needs one pitch: its exponential methods and its correctors are made for one"
         )
-    turbine = checks.load_turbine(spec, source)
-    checks.check_pitch(spec, turbine, source)
-    named = realisations(spec, turbine, source)
-    winds = checks.build_winds(named, spec, source)
-    initial = checks.initial_states(named, winds, spec, turbine, source)
-    ensemble = Ensemble(
-        turbine, winds, np.stack([initial[case.id] for case in named]), spec.duration, 1.0 / spec.output_rate,
-        float(np.deg2rad(spec.pitch)),
-    )  # fmt: skip
-    found = [i for i in integrations(spec, source) if not i.is_reference] if listed else []
+    resolved = resolve(spec, source)
+    reference, *others = [integration.build() for integration in resolved.integrations]
     return Cases(
-        spec.name, ensemble, spec.discard, list(spec.fatigue.channels), list(spec.fatigue.wohler_exponents), spec.fatigue.residue,
-        Integrator(spec.reference.method, spec.reference.step),
-        [Integrator(i.method, i.step, load_corrector(i.file), i.mode) if i.file else Integrator(i.method, i.step) for i in found],
+        spec.name, resolved.ensemble(), spec.discard, list(spec.fatigue.channels), list(spec.fatigue.wohler_exponents),
+        spec.fatigue.residue, reference, others if listed else [],
     )  # fmt: skip

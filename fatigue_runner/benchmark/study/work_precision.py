@@ -208,7 +208,7 @@ def times(
 
 def identity(sets: Sequence[Cases], settings: Settings) -> str:
     """Hash of all that decides the errors, so that they are not timed with another program's methods or winds."""
-    from fatigue_runner.campaign.cases import code_hash
+    from fatigue_runner.campaign.provenance import code_hash
 
     digest = hashlib.sha256(code_hash().encode())
     digest.update(json.dumps(settings.model_dump(), sort_keys=True).encode())

@@ -1,0 +1,74 @@
+"""What only turbine and integrators know of each other: refusals before anything runs, and what a person should know."""
+
+from __future__ import annotations
+
+from fatigue_runner.campaign.integration import Integration
+from fatigue_runner.campaign.resolve import Resolved
+from fatigue_runner.campaign.spec import Pitch
+from fatigue_runner.errors import InputError
+
+
+def check(resolved: Resolved) -> list[str]:
+    """Sentences that a person should read before the run.
+
+    Raises InputError, with the line, for a step above the stability limit, a corrector that does not fit, and a method that cannot
+    take the campaign's pitch.
+    """
+    for integration in resolved.integrations:
+        try:
+            _check(integration, resolved)
+        except _Refused as refused:
+            where = resolved.source.where((*integration.path, *refused.key))
+            raise InputError(f"{where}: {refused}") from None
+    return _unseen_winds(resolved)
+
+
+class _Refused(Exception):
+    """A sentence, and the key of the integrator's section that it is about."""
+
+    def __init__(self, sentence: str, *key: str) -> None:
+        super().__init__(sentence)
+        self.key = key
+
+
+def _check(integration: Integration, resolved: Resolved) -> None:
+    from fatigue_runner.integrators import stability_limit
+
+    built = integration.build()
+    if isinstance(resolved.campaign.pitch, Pitch) and (built.corrector or not built.found.varying_pitch):
+        what = f"corrector {integration.corrector}" if built.corrector else integration.method
+        raise _Refused(
+            f"{what} is made for one pitch; with a pitch that varies in time use Runge-Kutta and Adams methods without corrector"
+        )
+    if built.corrector:
+        # it may hold a step that the method alone does not; its own binding says what it fits
+        try:
+            built.corrector.bind(resolved.turbine, integration.method, integration.step)
+        except InputError as error:
+            raise _Refused(str(error), "corrector") from None
+        return
+    limit = stability_limit(resolved.turbine, integration.method)
+    if integration.step > limit:
+        raise _Refused(
+            f"{integration.method} at {integration.step * 1e3:g} ms is unstable on {resolved.turbine.name}: "
+            f"its stability limit is {limit * 1e3:.3g} ms; use a smaller step",
+            "step",
+        )
+
+
+def _unseen_winds(resolved: Resolved) -> list[str]:
+    """One sentence per corrector that meets mean wind speeds outside those it was trained on: allowed, but said."""
+    notes = {}
+    speeds = sorted({wind.source.mean_speed for wind in resolved.winds})
+    for integration in resolved.integrations:
+        if not integration.corrector:
+            continue
+        low, high = integration.build().corrector.wind_range
+        outside = [speed for speed in speeds if not low <= speed <= high]
+        if outside:
+            notes[integration.corrector] = (
+                f"{resolved.source.where((*integration.path, 'corrector'))}: {integration.corrector} was trained on winds of "
+                f"{low:.3g} to {high:.3g} m/s; {len(outside)} mean wind speed(s) lie outside, up to {outside[-1]:g} m/s: "
+                "look at the acceptance rate"
+            )
+    return list(notes.values())

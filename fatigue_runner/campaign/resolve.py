@@ -1,0 +1,201 @@
+"""From the words of a campaign file to what they name: turbine, pitch, integrators, winds and starts, each made once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fatigue_runner.campaign.integration import Integration, file_hash, load_corrector
+from fatigue_runner.campaign.spec import Campaign, IntegratorSection
+from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.source import Place, Source
+from fatigue_runner.inputs.sweep import expand
+from fatigue_runner.wind.section import Realisation, Site
+from fatigue_runner.wind.source import WindSource
+
+if TYPE_CHECKING:
+    from fatigue_runner.integrators import Ensemble
+    from fatigue_runner.integrators.pitch import PitchSeries
+    from fatigue_runner.turbine import Turbine
+
+# Above this the tip-speed ratio of a 5-MW-sized rotor leaves the aerodynamic tables for good.
+HIGHEST_WIND_SPEED = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class ResolvedWind:
+    """One wind of the campaign: what names it, what blows, and the state (16,) in which its cases start."""
+
+    named: Realisation
+    source: WindSource
+    initial: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Resolved:
+    """A campaign and everything that it names. `turbine_source` is what a worker gives to `load_turbine`; pitch [rad]."""
+
+    campaign: Campaign
+    source: Source
+    turbine: Turbine
+    turbine_source: str
+    pitch: float | PitchSeries
+    integrations: list[Integration]  # the reference first
+    winds: list[ResolvedWind]
+
+    def ensemble(
+        self, winds: Sequence[ResolvedWind] | None = None, duration: float | None = None
+    ) -> Ensemble:
+        """The cases of one integrator: of all winds, or of some, up to `duration` [s] where it is given."""
+        from fatigue_runner.integrators import Ensemble
+
+        chosen = self.winds if winds is None else winds
+        return Ensemble(
+            self.turbine,
+            [wind.source for wind in chosen],
+            np.stack([wind.initial for wind in chosen]),
+            self.campaign.duration if duration is None else duration,
+            1.0 / self.campaign.output_rate,
+            self.pitch,
+        )
+
+
+def resolve(campaign: Campaign, source: Source) -> Resolved:
+    """Everything that a campaign names. Raises InputError, with the line, for what is not there, cannot be read or cannot be made."""
+    turbine_source = _turbine_source(campaign, source)
+    turbine = _load_turbine(turbine_source, source)
+    pitch = _pitch(campaign, turbine, source)
+    integrations = _integrations(campaign, source)
+    winds = _winds(campaign, turbine, pitch, source)
+    return Resolved(campaign, source, turbine, turbine_source, pitch, integrations, winds)
+
+
+def _turbine_source(campaign: Campaign, source: Source) -> str:
+    """A shipped turbine's name, or a YAML's path relative to the campaign file."""
+    name = campaign.turbine
+    return str(source.file(name)) if Path(name).suffix in {".yaml", ".yml"} or "/" in name else name
+
+
+def _load_turbine(turbine: str, source: Source) -> Turbine:
+    from fatigue_runner.turbine import load_turbine
+
+    try:
+        return load_turbine(turbine)
+    except InputError as error:
+        raise InputError(f"{source.where(('turbine',))}: {error}") from None
+
+
+def _pitch(campaign: Campaign, turbine: Turbine, source: Source) -> float | PitchSeries:
+    """The pitch [rad]; refused outside the aerodynamic tables, and a schedule that is too short or does not fit."""
+    from fatigue_runner.integrators.pitch import PitchSeries
+
+    pitch = campaign.blade_pitch
+    try:
+        if isinstance(pitch, PitchSeries):
+            pitch.cells(turbine, campaign.duration)
+            turbine.pitched_kernel_data()
+        else:
+            turbine.kernel_data(pitch)
+    except InputError as error:
+        raise InputError(f"{source.where(('pitch',))}: {error}") from None
+    return pitch
+
+
+def _integrations(campaign: Campaign, source: Source) -> list[Integration]:
+    """The reference first, then every integrator at each of its steps; correctors are found and read here."""
+    from fatigue_runner.integrators import method
+
+    reference = campaign.reference
+    found = [Integration(reference.method, reference.step, True, ("reference",))] if reference else []
+    for index, section in enumerate(campaign.integrators):
+        path = ("integrators", index)
+        corrector = _corrector(section, source, path)
+        found += [
+            Integration(section.method, step, False, path, **corrector) for step, _ in expand(section.step)
+        ]
+    for integration in found:
+        try:
+            method(integration.method)
+        except InputError as error:
+            raise InputError(f"{source.where((*integration.path, 'method'))}: {error}") from None
+    return found
+
+
+def _corrector(section: IntegratorSection, source: Source, path: tuple[str | int, ...]) -> dict[str, str]:
+    """The fields of an `Integration` that say which corrector; none where there is none."""
+    if section.corrector is None:
+        return {}
+    from fatigue_runner.corrector import library
+
+    try:
+        file = library.locate(section.corrector, [source.folder]).resolve()
+        digest = file_hash(file)
+        name = load_corrector(str(file), digest).name
+    except InputError as error:
+        raise InputError(f"{source.where((*path, 'corrector'))}: {error}") from None
+    return {"corrector": name, "mode": section.mode, "file": str(file), "digest": digest}
+
+
+def _winds(
+    campaign: Campaign, turbine: Turbine, pitch: float | PitchSeries, source: Source
+) -> list[ResolvedWind]:
+    """Every wind with its start; those of one mean wind share it."""
+    place = Place(source, ("wind",))
+    winds, starts = [], _Starts(campaign, turbine, pitch)
+    for named in campaign.wind.realisations(Site(turbine.rotor, campaign.duration, place)):
+        where = place.where(*named.path)
+        blowing = _blowing(named, campaign.duration, where)
+        try:
+            winds.append(ResolvedWind(named, blowing, starts.of(blowing)))
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+    return winds
+
+
+def _blowing(named: Realisation, duration: float, where: str) -> WindSource:
+    """The wind source; refused outside the tables or where it is too short."""
+    if named.mean_speed is not None:
+        _check_speed(named.mean_speed, where)
+    try:
+        wind = named.build()
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    _check_speed(wind.mean_speed, where)
+    if wind.length < duration * (1 - 1e-9):
+        raise InputError(
+            f"{where}: the wind {wind.name} is {wind.length:g} s long, the campaign runs "
+            f"{duration:g} s; give a longer file or a shorter `duration`"
+        )
+    return wind
+
+
+def _check_speed(speed: float, where: str) -> None:
+    if not 0.0 < speed <= HIGHEST_WIND_SPEED:
+        raise InputError(
+            f"{where}: wind speed {speed:g} m/s is outside the aerodynamic tables; "
+            f"use speeds above 0 and up to {HIGHEST_WIND_SPEED:g} m/s"
+        )
+
+
+class _Starts:
+    """The state in which a wind's cases start, found once per mean wind: so a wind without one is refused before anything runs."""
+
+    def __init__(self, campaign: Campaign, turbine: Turbine, pitch: float | PitchSeries) -> None:
+        from fatigue_runner.integrators.pitch import first_pitch
+
+        self._turbine, self._initial, self._pitch = turbine, campaign.initial, first_pitch(pitch)
+        self._found: dict[Any, NDArray[np.float64]] = {}
+
+    def of(self, wind: WindSource) -> NDArray[np.float64]:
+        from fatigue_runner.integrators.initial import initial_state
+
+        label = wind.label
+        key = wind.mean_speed, label.get("vertical_shear"), label.get("horizontal_shear")
+        if key not in self._found:
+            self._found[key] = initial_state(self._turbine, self._initial, wind, self._pitch)
+        return self._found[key]
