@@ -118,17 +118,14 @@ def kept():
     return ratios
 
 
-FIELDS = "Veers' simulation of a grid of 225 points over 1500 frequencies at five wind speeds"
-
-
-@pytest.mark.slow(reason=FIELDS)
+@pytest.mark.slow(reason="Veers' simulation of 225 points over 1500 frequencies at five wind speeds")
 def test_the_default_is_the_least_number_of_harmonics_that_keeps_98_percent_of_every_load(kept):
     assert DEFAULT_HARMONICS == 6
     assert min(ratio[6].min() for ratio in kept.values()) >= 0.98
     assert min(ratio[5].min() for ratio in kept.values()) < 0.975
 
 
-@pytest.mark.slow(reason=FIELDS)
+@pytest.mark.slow(reason="Veers' simulation of 225 points over 1500 frequencies at five wind speeds")
 @pytest.mark.parametrize(
     ("mean", "harmonics", "expected"),
     [
