@@ -1,0 +1,51 @@
+"""The documentation holds together: every link leads somewhere, every page is in the menu, every decision in the index."""
+
+from __future__ import annotations
+
+import re
+import sys
+
+import pytest
+from places import ROOT
+
+sys.path.insert(0, str(ROOT / "tools"))
+docs_site = pytest.importorskip("docs_site", reason="the site needs the extra `docs`")
+
+DOCS = ROOT / "docs"
+PAGES = {place: ROOT / name for name, place in docs_site.PAGES.items()}
+PAGES |= {path.relative_to(DOCS).as_posix(): path for path in sorted(DOCS.rglob("*.md"))}
+DECISIONS = sorted((DOCS / "decisions").glob("[0-9]*.md"))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_leads_to_a_file(page):
+    linked = [link for _, link, _ in docs_site.links(PAGES[page].read_text(encoding="utf-8"))]
+    assert [link for link in linked if not (ROOT / docs_site.resolved(page, link)).is_file()] == []
+
+
+def test_every_page_is_in_the_menu():
+    menu = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").split("\nnav:")[1].split("\nvalidation:")[0]
+    assert sorted([*re.findall(r"[\w./-]+\.md", menu), *docs_site.decisions()]) == sorted(PAGES), (
+        "list the page in mkdocs.yml"
+    )
+
+
+def test_decisions_are_numbered_without_gaps_and_all_in_the_index():
+    assert [int(path.name[:4]) for path in DECISIONS] == list(range(1, len(DECISIONS) + 1))
+    index = (DOCS / "decisions" / "index.md").read_text(encoding="utf-8")
+    assert re.findall(r"^\| \[(\d+)\]\((.+?)\) \| \S", index, re.MULTILINE) == [
+        (str(number), path.name) for number, path in enumerate(DECISIONS, 1)
+    ], "every record needs its line in docs/decisions/index.md"
+
+
+def test_links_of_the_repository_become_links_of_the_site():
+    text = "[a](../fatigue_runner/errors.py) [b](logs.md#speed) [c](../README.md) [d](https://x.org/a.md) [e](../gone.py)"
+    assert docs_site.rewritten("correctors.md", text) == (
+        "[a](repository/fatigue_runner/errors.py) [b](logs.md#speed) [c](index.md) [d](https://x.org/a.md) [e](../gone.py)"
+    )
+    assert (
+        docs_site.rewritten("decisions/index.md", "[a](../../CONTRIBUTING.md)") == "[a](../CONTRIBUTING.md)"
+    )
+    assert docs_site.rewritten("CONTRIBUTING.md", "[a](docs/logs.md)\n```\n[b](docs/logs.md)\n```") == (
+        "[a](logs.md)\n```\n[b](docs/logs.md)\n```"
+    )
