@@ -11,6 +11,7 @@ from fatigue_runner.trajectory import Trajectory
 
 RUN = {"case_id": "w08-hybrid-10ms", "wind_speed": "8.25", "method": "rk3", "turbine_hash": "ab12"}
 RESULT = {"acceptance_rate": "0.9", "del_blade1_root_flapwise_moment_m10": "4.928e6"}
+COMPRESSIONS = ("zstd", "lz4", "none")
 ATTACHMENTS = {"campaign.yaml": b"wind:\n  speeds: [8.25]\n", "turbine.yaml": bytes(range(256))}
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays as numpy_arrays
-from logbook_example import ATTACHMENTS, RESULT, RUN, differing, example, same_bits
+from logbook_example import ATTACHMENTS, COMPRESSIONS, RESULT, RUN, differing, example, same_bits
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 
@@ -17,14 +15,6 @@ from fatigue_runner import channels
 from fatigue_runner.fatigue import damage_equivalent_load
 from fatigue_runner.logbook import LogError, LogWriter, is_complete, read_log, read_metadata, write_log
 from fatigue_runner.logbook.records import walk
-
-COMPRESSIONS = ("zstd", "lz4", "none")
-
-
-@pytest.fixture(scope="module", params=COMPRESSIONS)
-def log_path(request, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("logs") / f"{request.param}.mcap"
-    return write_log(path, example(3000), RUN, ATTACHMENTS, RESULT, compression=request.param)
 
 
 def test_every_array_comes_back_to_the_bit(log_path):

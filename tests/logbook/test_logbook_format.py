@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from logbook_example import ATTACHMENTS, RESULT, RUN, example
+from logbook_example import example
 from mcap.opcode import Opcode
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Schema
@@ -19,18 +19,10 @@ from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 from fatigue_runner import channels
-from fatigue_runner.logbook import read_log, write_log
+from fatigue_runner.logbook import read_log
 from fatigue_runner.logbook.generic import message_class
 from fatigue_runner.logbook.records import walk
 from fatigue_runner.logbook.schema import TOPICS, descriptor_set, fields_in
-
-COMPRESSIONS = ("zstd", "lz4", "none")
-
-
-@pytest.fixture(scope="module", params=COMPRESSIONS)
-def log_path(request, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("logs") / f"{request.param}.mcap"
-    return write_log(path, example(3000), RUN, ATTACHMENTS, RESULT, compression=request.param)
 
 
 def test_the_librarys_seeking_reader_accepts_it_with_checksums(log_path):
