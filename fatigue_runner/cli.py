@@ -20,7 +20,7 @@ from fatigue_runner.terminal import console
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fatigue_runner.campaign import Results
+    from fatigue_runner.results import Results
 
 # The rooms' commands, loaded when they are called: modules with a Typer app named `app`.
 MOUNTED = {

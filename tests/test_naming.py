@@ -6,7 +6,7 @@ import pytest
 
 from fatigue_runner import naming
 from fatigue_runner.integrators import Integrator
-from fatigue_runner.report import cells
+from fatigue_runner.results import cells
 from fatigue_runner.viewer import overview
 
 

@@ -4,7 +4,6 @@ Blocks of cases go to the lane kernel on a pool of workers; every finished case 
 row of the results table. A run folder can be resumed.
 """
 
-from fatigue_runner.campaign.results import Results
 from fatigue_runner.campaign.run import CampaignInterrupted, run_campaign
 
-__all__ = ["CampaignInterrupted", "Results", "run_campaign"]
+__all__ = ["CampaignInterrupted", "run_campaign"]

@@ -12,7 +12,6 @@ import numpy as np
 
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.evaluate import (
-    DESCRIPTION,
     Evaluated,
     evaluate,
     failed_row,
@@ -22,6 +21,7 @@ from fatigue_runner.campaign.evaluate import (
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.results.columns import DESCRIPTION
 from fatigue_runner.trajectory import Trajectory
 
 

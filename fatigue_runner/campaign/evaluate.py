@@ -10,16 +10,11 @@ import numpy as np
 
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.integration import Integration
-from fatigue_runner.campaign.results import columns, fatigue_keys, known
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.results.columns import WIND, columns, fatigue_keys
+from fatigue_runner.results.table import known
 from fatigue_runner.trajectory import Trajectory
-
-# The columns that say what was simulated; a log carries them too.
-DESCRIPTION = (
-    *("wind_source", "wind_speed", "vertical_shear", "horizontal_shear", "turbulence_intensity", "seed"),
-    *("pitch_deg", "method", "step", "corrector", "mode", "is_reference"),
-)
 
 
 @dataclass
@@ -127,12 +122,10 @@ def empty_row(case: Case, campaign: Campaign) -> dict[str, Any]:
 def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
     """The columns that say which wind and which pitch [deg] it was, and which winds a corrector knows."""
     label = wind.label
-    names = ("vertical_shear", "horizontal_shear", "turbulence_intensity", "seed")
     return {
+        **{name: known(label.get(name)) for name in WIND},
         "wind_source": case.wind.kind,
-        "wind_speed": known(label["wind_speed"]),
         "pitch_deg": campaign.pitch if isinstance(campaign.pitch, float) else None,
-        **{name: known(label.get(name)) for name in names},
         **_trained(case.integration),
     }
 
@@ -168,8 +161,8 @@ def _costs(trajectory: Trajectory) -> dict[str, Any]:
 
 
 def _errors(own: Evaluated, reference: Evaluated, campaign: Campaign) -> dict[str, Any]:
-    from fatigue_runner.accuracy import compare
     from fatigue_runner.fatigue import damage_ratio, load_error
+    from fatigue_runner.results.accuracy import compare
 
     errors: dict[str, Any] = dict(compare(own.trajectory, reference.trajectory).to_dict())
     for channel, m, suffix in _fatigue(campaign):

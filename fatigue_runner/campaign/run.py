@@ -12,10 +12,11 @@ from fatigue_runner.campaign.about import about, resolved_yaml, turbine_yaml
 from fatigue_runner.campaign.block import Setup, run_block
 from fatigue_runner.campaign.plan import Plan, make_plan
 from fatigue_runner.campaign.pool import connect, run_jobs
-from fatigue_runner.campaign.results import Results, columns
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.campaign.trust import reference_facts
 from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.results.columns import columns
+from fatigue_runner.results.table import Results
 
 if TYPE_CHECKING:
     from rich.console import Console

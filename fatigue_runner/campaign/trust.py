@@ -88,8 +88,8 @@ class _Block:
 
 def _distance(test: Evaluated, reference: Evaluated) -> tuple[float, float]:
     """NRMSE of the worst state, largest DEL error."""
-    from fatigue_runner.accuracy import compare
     from fatigue_runner.fatigue import load_error
+    from fatigue_runner.results.accuracy import compare
 
     errors = [load_error(load, reference.loads[key]) for key, load in test.loads.items()]
     worst = max((abs(e) for e in errors if e is not None), default=0.0)

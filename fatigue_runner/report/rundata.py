@@ -6,7 +6,6 @@ Settings and facts come from `run.json`; a folder without one (results from else
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,21 +15,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.errors import FatigueRunnerError, InputError
-from fatigue_runner.report.cells import Row, number, text
-from fatigue_runner.report.ranking import MethodSummary, fatigue_columns, integrator_key, rank, reference_of
+from fatigue_runner.results.cells import Row, number, text
+from fatigue_runner.results.columns import WIND
+from fatigue_runner.results.ranking import MethodSummary, fatigue_columns, integrator_key, rank, reference_of
+from fatigue_runner.results.table import read_results
 
 if TYPE_CHECKING:
     from fatigue_runner.logbook import Log
-
-NEEDED_COLUMNS = ("case_id", "method", "step", "is_reference", "status")
-WIND_COLUMNS = (
-    "wind_source",
-    "wind_speed",
-    "vertical_shear",
-    "horizontal_shear",
-    "turbulence_intensity",
-    "seed",
-)
 
 
 @dataclass(frozen=True)
@@ -84,7 +75,7 @@ class Run:
         """Every wind of the campaign with its rows, slowest first."""
         groups: dict[tuple[str, ...], list[Row]] = {}
         for row in self.rows:
-            groups.setdefault(tuple(text(row, column) for column in WIND_COLUMNS), []).append(row)
+            groups.setdefault(tuple(text(row, column) for column in WIND), []).append(row)
         winds = [WindCase(number(rows[0], "wind_speed"), key, tuple(rows)) for key, rows in groups.items()]
         return sorted(winds, key=lambda wind: (wind.speed is None, wind.speed or 0.0, wind.key))
 
@@ -132,21 +123,7 @@ def load_run(folder: Path) -> Run:
     Raises InputError, one sentence, for a folder without results, an empty or foreign table, or unreadable
     settings.
     """
-    table = folder / "results.csv"
-    if not table.is_file():
-        raise InputError(f"{folder} holds no results.csv; give the output folder of `fatigue-runner run`")
-    try:
-        with table.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(
-            f"{table} cannot be read as CSV: {error}; run the campaign again to rewrite it"
-        ) from None
-    if not rows:
-        raise InputError(f"{table} has no cases; run the campaign again to fill it")
-    missing = [column for column in NEEDED_COLUMNS if column not in rows[0]]
-    if missing:
-        raise InputError(f"{table} lacks the column {missing[0]!r}; is it the results table of a campaign?")
+    rows = read_results(folder)
     return Run(folder, rows, *_read_settings(folder))
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fatigue_runner.report.ranking import LEVELS, MethodSummary, cheapest_within
 from fatigue_runner.report.rundata import Run, WindCase
 from fatigue_runner.report.style import family
+from fatigue_runner.results.ranking import LEVELS, MethodSummary, cheapest_within
 
 
 def shown_integrators(run: Run, limit: int = 5) -> list[MethodSummary]:

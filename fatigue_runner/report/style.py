@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fatigue_runner.report.ranking import MethodSummary
+from fatigue_runner.results.ranking import MethodSummary
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.channels import BY_NAME
-from fatigue_runner.report.cells import Row, format_percent, numbers
-from fatigue_runner.report.ranking import (
+from fatigue_runner.results.cells import Row, format_percent, numbers
+from fatigue_runner.results.ranking import (
     LEVELS,
     MethodSummary,
     answer,

@@ -13,21 +13,14 @@ import numpy as np
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.logbook import Log, LogError, read_log, read_metadata
 from fatigue_runner.naming import integrator_label
+from fatigue_runner.results.columns import WIND
 from fatigue_runner.turbine.parameters import read_turbine_file
 from fatigue_runner.viewer import colours
 from fatigue_runner.viewer.scene import Geometry, geometry
 from fatigue_runner.viewer.shapes import BladeSkin, blade_skin
 
 MAX_CASES = 4  # side by side; more turbines are too small to see
-_WIND_KEYS = (
-    "wind",
-    "wind_source",
-    "wind_speed",
-    "vertical_shear",
-    "horizontal_shear",
-    "turbulence_intensity",
-    "seed",
-)
+_WIND_KEYS = ("wind", *WIND)  # of a log: the name of the wind, and what the results table says of it
 
 
 @dataclass

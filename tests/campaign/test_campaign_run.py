@@ -12,11 +12,11 @@ from campaign_world import CAMPAIGN, build_world, write_campaign
 from ruamel.yaml import YAML
 
 from fatigue_runner.campaign import CampaignInterrupted, run_campaign
-from fatigue_runner.campaign.results import columns
 from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES
 from fatigue_runner.errors import InputError
 from fatigue_runner.fatigue import damage_equivalent_load, short_term_cycles
 from fatigue_runner.logbook import read_log
+from fatigue_runner.results.columns import columns
 
 
 @pytest.fixture

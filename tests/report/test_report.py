@@ -147,18 +147,17 @@ def test_the_first_table_has_one_row_per_integrator_with_cost_and_verdict(page):
     assert cells["rk7 1 ms (reference)"][-1] == "reference"
 
 
-def test_a_diverged_case_is_listed_with_its_time_and_its_probability_as_lost(page):
-    assert "heun 40 ms: 1 of 6 cases did not finish; 17 % of the probability is lost" in page.text
+def test_a_diverged_case_is_listed_with_its_time_and_counted_as_lost(page):
+    assert "heun 40 ms: 1 of 6 cases did not finish (17 %); no damage is counted for them" in page.text
     listed = next(table for table in page.tables if "Reason" in table[0])
     assert listed[1:] == [
         ["10", "0.1 / 0", "–", "heun 40 ms", "diverged", "31.4", "rotor speed left ±10 rad/s"]
     ]
 
 
-def test_lost_probability_is_weighted_where_the_cases_have_probabilities():
-    cases = [{"status": "done", "probability": 0.9}, {"status": "failed", "probability": 0.1}]
-    assert limits.lost_probability(cases) == pytest.approx(0.1)
-    assert limits.lost_probability([{"status": "done"}, {"status": "diverged"}]) == 0.5
+def test_lost_cases_are_told_as_their_share():
+    assert limits.lost_share([{"status": "done"}, {"status": "diverged"}]) == 0.5
+    assert limits.lost_share([]) == 0.0
 
 
 def test_the_definitions_carry_the_settings_of_the_run(tmp_path, rows):
@@ -354,7 +353,7 @@ def test_methods_differ_in_colour_and_steps_in_line(folder):
 def test_a_finished_campaign_says_that_nothing_is_lost(tmp_path):
     run = load_run(write_run(tmp_path / "run", example_rows(diverging=False)))
     first = build("cases", run).blocks[0]
-    assert isinstance(first, Paragraph) and first.text == "All 60 cases finished; no probability is lost."
+    assert isinstance(first, Paragraph) and first.text == "All 60 cases finished."
 
 
 def test_labels_avoid_each_other_where_points_are_close_and_stay_in_place_where_they_are_not():

@@ -74,7 +74,7 @@ def outcome(
 ) -> Outcome:
     """Errors against the reference; of the time, the least of the repeats: other work of the machine only adds to it. Runs of steps
     below a millisecond are long enough to be timed once."""
-    from fatigue_runner.accuracy import compare
+    from fatigue_runner.results.accuracy import compare
 
     runs = cases.run(integrator)
     walls = [sum(r.wall_time for r in runs)]

@@ -122,8 +122,8 @@ def make_reference(cases: Cases) -> Reference:
 
 def evaluate(block: Sequence[Any], reference: Reference, cases: Cases, point: Point) -> Point:
     """Fill in a point's errors; nothing but the divergence where a case diverged."""
-    from fatigue_runner.accuracy import compare
     from fatigue_runner.fatigue import load_error
+    from fatigue_runner.results.accuracy import compare
 
     times = [t.diverged_at for t in block if t.diverged_at is not None]
     if times:

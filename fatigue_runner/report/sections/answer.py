@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fatigue_runner.report.blocks import Column, Paragraph, Section, Table, TableRow
-from fatigue_runner.report.cells import format_count, format_error, format_percent
-from fatigue_runner.report.ranking import LEVELS, MethodSummary, answer, cheapest_within
 from fatigue_runner.report.rundata import Run
+from fatigue_runner.results.cells import format_count, format_error, format_percent
+from fatigue_runner.results.ranking import LEVELS, MethodSummary, answer, cheapest_within
 
 ORDER = 10
 

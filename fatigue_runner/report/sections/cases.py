@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fatigue_runner.report.blocks import Block, Column, Paragraph, Section, Table, TableRow
-from fatigue_runner.report.cells import Row, format_error, format_percent, integrator, number, text, truth
 from fatigue_runner.report.rundata import Run
-from fatigue_runner.report.sections.limits import lost_probability
+from fatigue_runner.report.sections.limits import lost_share
+from fatigue_runner.results.cells import Row, format_error, format_percent, integrator, number, text, truth
 
 ORDER = 70
 MOST = 200  # rows on paper; the rest is in results.csv
@@ -20,7 +20,7 @@ def build(run: Run) -> Section:
 def _unfinished(run: Run) -> list[Block]:
     bad = [row for row in run.rows if text(row, "status") != "done"]
     if not bad:
-        return [Paragraph(f"All {len(run.rows)} cases finished; no probability is lost.")]
+        return [Paragraph(f"All {len(run.rows)} cases finished.")]
     columns = [
         *CASE_COLUMNS[:4],
         Column("Status", number=False),
@@ -32,9 +32,8 @@ def _unfinished(run: Run) -> list[Block]:
         for row in bad
     ]
     caption = (
-        f"Cases that did not finish: {len(bad)} of {len(run.rows)}, lost probability over all integrators "
-        f"{format_percent(lost_probability(run.rows))}. They are logged up to the time given and left out of "
-        "every load."
+        f"Cases that did not finish: {len(bad)} of {len(run.rows)} ({format_percent(lost_share(run.rows))}). "
+        "They are logged up to the time given and left out of every load."
     )
     return [Table(columns, rows, caption)]
 

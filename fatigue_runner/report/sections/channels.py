@@ -6,11 +6,11 @@ from statistics import median
 
 from fatigue_runner.channels import BY_NAME, STATES
 from fatigue_runner.report.blocks import Block, Column, Section, Table, TableRow
-from fatigue_runner.report.cells import Row, format_error, format_percent, number, numbers
-from fatigue_runner.report.ranking import MethodSummary
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.sections.limits import rows_of
 from fatigue_runner.report.selection import left_out, shown_integrators
+from fatigue_runner.results.cells import Row, format_error, format_percent, number, numbers
+from fatigue_runner.results.ranking import MethodSummary
 
 ORDER = 60
 

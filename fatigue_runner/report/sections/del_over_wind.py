@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 from fatigue_runner.channels import BY_NAME, Channel
 from fatigue_runner.report.blocks import Figure, Paragraph, Section
-from fatigue_runner.report.cells import Row, number, numbers, text
-from fatigue_runner.report.ranking import MethodSummary
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.selection import left_out, shown_integrators
 from fatigue_runner.report.style import (
@@ -26,6 +24,8 @@ from fatigue_runner.report.style import (
     styled,
     to_svg,
 )
+from fatigue_runner.results.cells import Row, number, numbers, text
+from fatigue_runner.results.ranking import MethodSummary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from fatigue_runner.naming import step_label
 from fatigue_runner.report.blocks import Figure, Paragraph, Section
 from fatigue_runner.report.labels import Label, draw_labels
-from fatigue_runner.report.ranking import LEVELS, MethodSummary, pareto
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.style import (
     FAINT,
@@ -22,6 +21,7 @@ from fatigue_runner.report.style import (
     styled,
     to_svg,
 )
+from fatigue_runner.results.ranking import LEVELS, MethodSummary, pareto
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

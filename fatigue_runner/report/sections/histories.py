@@ -9,11 +9,11 @@ import numpy as np
 
 from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.report.blocks import Figure, Paragraph, Section
-from fatigue_runner.report.cells import number, text
-from fatigue_runner.report.ranking import MethodSummary
 from fatigue_runner.report.rundata import Run, WindCase
 from fatigue_runner.report.selection import left_out, shown_integrators, shown_winds
 from fatigue_runner.report.style import INK, Look, draw_legend, looks, new_figure, styled, to_svg
+from fatigue_runner.results.cells import number, text
+from fatigue_runner.results.ranking import MethodSummary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

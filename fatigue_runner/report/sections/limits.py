@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fatigue_runner.report.blocks import Section, Warnings
-from fatigue_runner.report.cells import Row, format_percent, number, text
-from fatigue_runner.report.ranking import unseen_winds
 from fatigue_runner.report.rundata import Run
+from fatigue_runner.results.cells import Row, format_percent, number, text
+from fatigue_runner.results.ranking import unseen_winds
 
 ORDER = 20
 NEAR = 10.0  # times what is known of the reference: errors below are its own as likely as the integrator's
@@ -19,18 +19,14 @@ def build(run: Run) -> Section | None:
     return Section("What limits this result", [Warnings(items)]) if items else None
 
 
-def lost_probability(rows: list[Row]) -> float:
-    """Share of the probability in cases that did not finish; without weights every case weighs the same."""
-    weights = [number(row, "probability") or 0.0 for row in rows]
-    if not any(weights):
-        weights = [1.0] * len(rows)
-    lost = sum(w for w, row in zip(weights, rows, strict=True) if text(row, "status") != "done")
-    return lost / sum(weights) if rows else 0.0
+def lost_share(rows: list[Row]) -> float:
+    """Share of the cases that did not finish."""
+    return sum(text(row, "status") != "done" for row in rows) / len(rows) if rows else 0.0
 
 
 def rows_of(run: Run, key: tuple) -> list[Row]:
     """All rows of one integrator."""
-    from fatigue_runner.report.ranking import integrator_key
+    from fatigue_runner.results.ranking import integrator_key
 
     return [row for row in run.rows if integrator_key(row) == key]
 
@@ -53,10 +49,10 @@ def _lost(run: Run) -> list[str]:
     items = []
     for s in run.summaries:
         if s.cases and not s.complete:
-            share = format_percent(lost_probability(rows_of(run, s.key)))
+            share = format_percent(lost_share(rows_of(run, s.key)))
             items.append(
-                f"{s.label}: {s.cases - s.done} of {s.cases} cases did not finish; {share} of the "
-                "probability is lost and no damage is counted for it. The cases are listed below."
+                f"{s.label}: {s.cases - s.done} of {s.cases} cases did not finish ({share}); no damage is counted for them. "
+                "They are listed below."
             )
     return items
 

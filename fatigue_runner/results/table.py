@@ -1,51 +1,18 @@
-"""The results table: its columns, the rows as Python values, and the files they are written to."""
+"""The results table: the rows as Python values, and the files they are written to and read from."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner.channels import LOAD_NAMES, STATE_NAMES
+from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import write_atomically
-
-_CASE = (
-    *(
-        "case_id",
-        "wind_source",
-        "wind_speed",
-        "vertical_shear",
-        "horizontal_shear",
-        "turbulence_intensity",
-        "seed",
-    ),
-    *("pitch_deg", "method", "step", "corrector", "mode", "is_reference"),
-    *("status", "diverged_at", "error_message", "duration", "steps", "evaluations", "evaluations_per_second"),
-    *("wall_time", "clamped_lookups", "acceptance_rate", "trained_from", "trained_to"),
-    *("nrmse_max", "nrmse_mean", "delta_e", "delta_e_range", "delta_t"),
-)
-_TEXT = {"case_id", "wind_source", "method", "corrector", "mode", "status", "error_message"}
-_WHOLE = {"seed", "steps", "evaluations", "clamped_lookups"}
-
-
-def fatigue_keys(channels: Sequence[str], exponents: Sequence[float]) -> list[tuple[str, float, str]]:
-    """(channel, exponent, suffix of its columns): `blade1_root_flapwise_moment_m10`."""
-    return [(channel, m, f"{channel}_m{m:g}") for channel in channels for m in exponents]
-
-
-def columns(channels: Sequence[str], exponents: Sequence[float]) -> list[str]:
-    """All columns of the results table in their order, for these fatigue channels and Wöhler exponents."""
-    fatigue = [
-        f"{figure}_{suffix}"
-        for _, _, suffix in fatigue_keys(channels, exponents)
-        for figure in ("del", "del_error", "damage_ratio")
-    ]
-    statistics = [f"{figure}_{channel}" for channel in LOAD_NAMES for figure in ("mean", "min", "max")]
-    return [*_CASE, *(f"nrmse_{state}" for state in STATE_NAMES), *fatigue, *statistics]
+from fatigue_runner.results.columns import NEEDED, kind_of
 
 
 def known(value: Any) -> Any:
@@ -110,12 +77,31 @@ class Results:
         except ImportError:
             return
 
-        def kind(name: str) -> Any:
-            if name in _TEXT:
-                return pa.string()
-            return pa.bool_() if name == "is_reference" else pa.int64() if name in _WHOLE else pa.float64()
-
-        schema = pa.schema([(name, kind(name)) for name in self.columns])
+        types = {"text": pa.string(), "truth": pa.bool_(), "whole": pa.int64(), "number": pa.float64()}
+        schema = pa.schema([(name, types[kind_of(name)]) for name in self.columns])
         buffer = io.BytesIO()
         pq.write_table(pa.Table.from_pylist(self.rows, schema=schema), buffer)
         write_atomically(self.out / "results.parquet", buffer.getvalue())
+
+
+def read_results(folder: Path) -> list[dict[str, str]]:
+    """The rows of a run folder's `results.csv`, every cell as text (`cells` has their values).
+
+    Raises InputError, one sentence, for a folder without results and an empty or foreign table.
+    """
+    table = folder / "results.csv"
+    if not table.is_file():
+        raise InputError(f"{folder} holds no results.csv; give the output folder of `fatigue-runner run`")
+    try:
+        with table.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(
+            f"{table} cannot be read as CSV: {error}; run the campaign again to rewrite it"
+        ) from None
+    if not rows:
+        raise InputError(f"{table} has no cases; run the campaign again to fill it")
+    missing = [column for column in NEEDED if column not in rows[0]]
+    if missing:
+        raise InputError(f"{table} lacks the column {missing[0]!r}; is it the results table of a campaign?")
+    return rows

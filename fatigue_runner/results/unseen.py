@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fatigue_runner.report.cells import Row, number, numbers
+from fatigue_runner.results.cells import Row, number, numbers
 
 
 @dataclass(frozen=True)

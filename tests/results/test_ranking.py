@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fatigue_runner.report import ranking
-from fatigue_runner.report.cells import format_count, format_percent, number, truth
+from fatigue_runner.results import ranking
+from fatigue_runner.results.cells import format_count, format_percent, number, truth
 
 CHANNELS = ("blade1_root_flapwise_moment", "tower_base_fore_aft_moment")
 

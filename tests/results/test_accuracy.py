@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fatigue_runner.accuracy import compare
 from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.errors import InputError
+from fatigue_runner.results.accuracy import compare
 from fatigue_runner.trajectory import Trajectory
 
 N = 401

@@ -13,7 +13,7 @@ from statistics import median
 
 from fatigue_runner.channels import BY_NAME
 from fatigue_runner.naming import integrator_label
-from fatigue_runner.report.cells import (
+from fatigue_runner.results.cells import (
     Row,
     format_count,
     format_percent,
@@ -22,7 +22,7 @@ from fatigue_runner.report.cells import (
     text,
     truth,
 )
-from fatigue_runner.report.unseen import Unseen, unseen
+from fatigue_runner.results.unseen import Unseen, unseen
 
 # Good enough for engineering (well below the scatter between seeds), and good enough to validate against.
 LEVELS = (0.01, 0.001)

@@ -1,0 +1,122 @@
+"""The columns of the results table as data: name, unit, meaning, and the group to which each belongs.
+
+What a group is made of stands here and nowhere else: which columns tell two winds apart, which name an integrator, which say in a log
+what was simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from fatigue_runner.channels import LOADS, STATES
+
+Kind = Literal["number", "whole", "truth", "text"]
+Group = Literal[
+    "case", "wind", "operation", "integrator", "outcome", "cost", "training", "accuracy", "fatigue", "statistics"
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column; an empty cell is unknown or does not apply."""
+
+    name: str
+    group: Group
+    meaning: str
+    unit: str = "-"
+    kind: Kind = "number"
+
+
+def _text(name: str, group: Group, meaning: str) -> Column:
+    return Column(name, group, meaning, "", "text")
+
+
+# in the order of the table
+CASE = (
+    _text("case_id", "case", "name of the case; its log is logs/<case_id>.mcap"),
+    _text("wind_source", "wind", "type of the wind in the campaign file"),
+    Column("wind_speed", "wind", "mean hub-height wind speed", "m/s"),
+    Column("vertical_shear", "wind", "mean linear vertical shear, change of the wind over R"),
+    Column("horizontal_shear", "wind", "mean linear horizontal shear, change of the wind over R"),
+    Column("turbulence_intensity", "wind", "standard deviation over mean of the longitudinal wind at the hub"),
+    Column("seed", "wind", "of the turbulence", kind="whole"),
+    Column("pitch_deg", "operation", "blade pitch, positive to feather; empty where it varies in time", "deg"),
+    _text("method", "integrator", "integration method"),
+    Column("step", "integrator", "its time step", "s"),
+    _text("corrector", "integrator", "name of the learned corrector"),
+    _text("mode", "integrator", "enhanced: corrected; hybrid: corrected and guarded"),
+    Column("is_reference", "integrator", "whether the others are measured against it", "", "truth"),
+    _text("status", "outcome", "done, diverged (it ended early) or failed (it could not run or be written)"),
+    Column("diverged_at", "outcome", "simulated time at which the case diverged", "s"),
+    _text("error_message", "outcome", "why a case failed"),
+    Column("duration", "cost", "simulated time", "s"),
+    Column("steps", "cost", "steps taken", "-", "whole"),
+    Column("evaluations", "cost", "evaluations of the equations of motion", "-", "whole"),
+    Column("evaluations_per_second", "cost", "evaluations per simulated second", "1/s"),
+    Column("wall_time", "cost", "time of the integration, the case's share of its block", "s"),
+    Column("clamped_lookups", "cost", "look-ups outside the aerodynamic tables", "-", "whole"),
+    Column("acceptance_rate", "cost", "share of the steps at which a guard accepted the corrector"),
+    Column("trained_from", "training", "lowest mean wind speed that the corrector was trained on", "m/s"),
+    Column("trained_to", "training", "highest mean wind speed that the corrector was trained on", "m/s"),
+    Column("nrmse_max", "accuracy", "RMS error over the reference's range, of the worst state"),
+    Column("nrmse_mean", "accuracy", "RMS error over the reference's range, mean over the states"),
+    Column("delta_e", "accuracy", "mean square of error over value, arXiv:2504.05493"),
+    Column("delta_e_range", "accuracy", "mean square of error over range"),
+    Column("delta_t", "accuracy", "time saved against another integrator, arXiv:2504.05493; not measured per case"),
+)  # fmt: skip
+
+_FATIGUE = (
+    ("del", "damage-equivalent load at 1 Hz, Wöhler exponent {m:g}: {label}", None),
+    ("del_error", "relative error of that load against the reference's", "-"),
+    ("damage_ratio", "damage over the reference's", "-"),
+)
+_STATISTICS = (("mean", "mean"), ("min", "smallest"), ("max", "largest"))
+
+
+def fatigue_keys(channels: Sequence[str], exponents: Sequence[float]) -> list[tuple[str, float, str]]:
+    """(channel, exponent, suffix of its columns): `blade1_root_flapwise_moment_m10`."""
+    return [(channel, m, f"{channel}_m{m:g}") for channel in channels for m in exponents]
+
+
+def table(channels: Sequence[str], exponents: Sequence[float]) -> list[Column]:
+    """All columns of the results table in their order, for these fatigue channels and Wöhler exponents."""
+    loads = {load.name: load for load in LOADS}
+    states = [
+        Column(f"nrmse_{state.name}", "accuracy", f"RMS error over the reference's range: {state.label}")
+        for state in STATES
+    ]
+    fatigue = [
+        Column(f"{figure}_{suffix}", "fatigue", meaning.format(m=m, label=loads[channel].label), unit or loads[channel].unit)
+        for channel, m, suffix in fatigue_keys(channels, exponents)
+        for figure, meaning, unit in _FATIGUE
+    ]  # fmt: skip
+    statistics = [
+        Column(f"{figure}_{load.name}", "statistics", f"{word}: {load.label}", load.unit)
+        for load in LOADS
+        for figure, word in _STATISTICS
+    ]
+    return [*CASE, *states, *fatigue, *statistics]
+
+
+def columns(channels: Sequence[str], exponents: Sequence[float]) -> list[str]:
+    """Their names."""
+    return [column.name for column in table(channels, exponents)]
+
+
+def of_group(*groups: Group) -> tuple[str, ...]:
+    """Names of the columns of these groups, in the table's order."""
+    return tuple(column.name for column in CASE if column.group in groups)
+
+
+WIND = of_group("wind")  # what tells two winds apart
+INTEGRATOR = of_group("integrator")
+DESCRIPTION = of_group("wind", "operation", "integrator")  # what was simulated; a log says it, too
+NEEDED = ("case_id", "method", "step", "is_reference", "status")  # without them no table is a campaign's
+_KINDS = {column.name: column.kind for column in CASE}
+
+
+def kind_of(name: str) -> Kind:
+    """What stands in the cells of a column."""
+    return _KINDS.get(name, "number")
