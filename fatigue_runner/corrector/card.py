@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fatigue_runner.corrector.artefact import Corrector, Guard
+from fatigue_runner.corrector.corrector import Corrector
+from fatigue_runner.corrector.guard import Guard
 
 _LABELS = {
     "nrmse_plain": "plain {method}, median NRMSE over winds",
@@ -27,15 +28,13 @@ def summary(corrector: Corrector) -> list[tuple[str, str]]:
     )
     if corrector.past:
         fallback = f"{corrector.method} as it is"
-    looks = f", looks back {corrector.history} step(s)" if corrector.history else ""
-    features = f"{corrector.kind}{' x (1, ' + ', '.join(corrector.factors) + ')' if corrector.factors else ''}{looks}"
-    sizes = [w.shape for w in (corrector.predictor, corrector.linear, *corrector.layers) if w is not None]
+    sizes = [f"{a} x {b}" for a, b in (weights.shape for weights in corrector.map.tensors().values())]
     return [
         ("family", corrector.family),
         ("turbine", f"{corrector.turbine} ({corrector.turbine_hash[:12]})"),
         ("method, step", f"{corrector.method}, {corrector.step * 1e3:g} ms"),
-        ("features", features),
-        ("weights", ", ".join(f"{a} x {b}" for a, b in sizes)),
+        ("features", corrector.map.sees),
+        ("weights", ", ".join(sizes)),
         ("wind speeds seen", f"{corrector.wind_range[0]:.2f} to {corrector.wind_range[1]:.2f} m/s"),
         (
             "guard",

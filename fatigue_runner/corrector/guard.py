@@ -1,109 +1,55 @@
-"""The hybrid's acceptance threshold, from what a corrector does on its training set."""
+"""The hybrid's acceptance test as data: what may be accepted, and what is taken instead."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from fatigue_runner.corrector.errors import CorrectorError
+from fatigue_runner.corrector.features import STATES
 
-from fatigue_runner.corrector.artefact import Corrector, Guard
-from fatigue_runner.corrector.samples import Samples, single_steps
-from fatigue_runner.errors import InputError
-
-if TYPE_CHECKING:
-    from fatigue_runner.turbine import Turbine
-
-Array = NDArray[np.float64]
+NORMS = ("max", "rms")
 
 
-def fallback_substeps(turbine: Turbine, method: str, step: float, history: int = 0) -> int:
-    """0 where a method of the next order shares the stages and is stable at this step [s]; else the fewest substeps, two or more,
-    that keep the method itself a tenth below its stability limit."""
-    from fatigue_runner.integrators import stability_limit
-    from fatigue_runner.integrators.correcting import SHARING
+@dataclass(frozen=True)
+class Guard:
+    """|fallback - corrected| in units of atol + max(|x|, |fallback|) rtol is at most `limit`, else the fallback is taken.
 
-    if method in SHARING and not history and step <= stability_limit(turbine, SHARING[method]):
-        return 0
-    limit = stability_limit(turbine, method)
-    if limit <= 0:
-        raise InputError(
-            f"{method} is stable at no step on {turbine.name}, so it has no fallback; use another method"
-        )
-    return max(2, math.ceil(step / (0.9 * limit)))
-
-
-def fallback_results(
-    turbine: Turbine, method: str, step: float, substeps: int, samples: Samples, pitch: float = 0.0
-) -> Array:
-    """(n, 16) what the fallback makes of the samples' steps."""
-    from fatigue_runner.integrators.correcting import SHARING
-
-    assert samples.pieces is not None
-    if substeps == 0:
-        return single_steps(turbine, SHARING[method], step, samples.state, samples.pieces, pitch).plain
-    return single_steps(turbine, method, step, samples.state, samples.pieces, pitch, method, substeps).exact
-
-
-def distances(difference: Array, state: Array, fallback: Array, guard: Guard) -> Array:
-    """(n,) norm of `difference` (n, 16) in the guard's units, as the compiled `guard` measures it."""
-    scale = np.array(guard.atol) + np.maximum(np.abs(state), np.abs(fallback)) * np.array(guard.rtol)
-    scaled = np.abs(difference) / scale
-    return scaled.max(axis=1) if guard.norm == "max" else np.sqrt((scaled**2).mean(axis=1))
-
-
-def from_training_set(
-    corrector: Corrector,
-    turbine: Turbine,
-    samples: Samples,
-    norm: str = "max",
-    kappa: float = 2.0,
-    quantile: float = 1.0,
-    rtol: float = 0.0,
-    substeps: int | None = None,
-) -> Guard:
-    """limit = kappa * the quantile (1: the largest) over the samples of |fallback - corrected| in units of sc.
-
-    sc_i = atol_i + max(|x_i|, |fallback_i|) rtol with atol_i the samples' rms of that difference in state i, so that every state
-    weighs by what is usual for it. rtol is 0 by default: states cross zero, azimuths grow without limit.
+    limit = kappa * (largest, or the stated quantile, over the training set); atol, rtol (states,). `substeps`: 0 for a method of the
+    next order that shares the stages, else the fallback is that many smaller steps of the method itself.
+    low, high: bounds of the features behind the leading 1, without factors; a step whose features leave them is refused, whatever its
+    distance. Empty: no bounds. They are the extent of the training and validation samples, and `margin` times it on both sides.
+    ahead_atol (states,): atol for what an exponential Adams method predicts, in the units of the same limit; empty for other methods.
     """
-    if substeps is None:
-        substeps = fallback_substeps(turbine, corrector.method, corrector.step, corrector.history)
-    other = fallback_results(turbine, corrector.method, corrector.step, substeps, samples)
-    difference = samples.plain + corrector.predict(samples) - other
-    return limit_of(difference, samples.state, other, norm, kappa, quantile, rtol, substeps)
+
+    limit: float
+    norm: str
+    kappa: float
+    quantile: float
+    atol: tuple[float, ...]
+    rtol: tuple[float, ...]
+    substeps: int = 0
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
+    margin: float | None = None
+    ahead_atol: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.low) != len(self.high) or not all(
+            a <= b for a, b in zip(self.low, self.high, strict=True)
+        ):
+            raise CorrectorError("guard: low and high need a number per feature each, low at most at high")
+        if self.norm not in NORMS:
+            raise CorrectorError(f"guard: norm must be one of {', '.join(NORMS)}, got {self.norm!r}")
+        if not all(a > 0 for a in self.atol) or len(self.atol) != STATES or len(self.rtol) != STATES:
+            raise CorrectorError(
+                f"guard: atol needs {STATES} positive numbers: with 0 a state that crosses zero refuses every step"
+            )
+        if not (self.kappa >= 1 and self.limit >= 0 and 0 < self.quantile <= 1):
+            raise CorrectorError(
+                "guard: kappa must be at least 1, limit not negative, quantile above 0 and at most 1"
+            )
 
 
-def bounded(guard: Guard, features: Array, margin: float) -> Guard:
-    """The guard with bounds: the extent of features (n, 1 + k), whose leading 1 is left out, and `margin` times it on both sides.
-
-    The distance from the fallback holds the fallback's own error, so a network may be as wrong as that without being told from a good
-    one; far from the samples that is what happens.
-    """
-    low, high = features[:, 1:].min(axis=0), features[:, 1:].max(axis=0)
-    # what stands still in the samples may move by rounding
-    room = margin * (high - low) + 1e-9 * (1 + np.abs(high))
-    return replace(guard, low=tuple((low - room).tolist()), high=tuple((high + room).tolist()), margin=margin)
-
-
-def limit_of(
-    difference: Array,
-    state: Array,
-    fallback: Array,
-    norm: str,
-    kappa: float,
-    quantile: float,
-    rtol: float,
-    substeps: int = 0,
-) -> Guard:
-    """The guard whose limit is kappa * the quantile of |difference| (n, 16) in its units; see `from_training_set`."""
-    usual = np.sqrt((difference**2).mean(axis=0))
-    # never 0: a constant wind leaves states at rest
-    atol = np.maximum(usual, 1e-15 * (1 + np.abs(state).max(axis=0)))
-    guard = Guard(0.0, norm, kappa, quantile, tuple(atol.tolist()), (rtol,) * 16, substeps)
-    size = distances(difference, state, fallback, guard)
-    return Guard(
-        kappa * float(np.quantile(size, quantile)), norm, kappa, quantile, guard.atol, guard.rtol, substeps
-    )
+def open_guard(norm: str = "max", substeps: int = 2) -> Guard:
+    """For a corrector whose threshold is still to be found: nothing would be accepted."""
+    return Guard(0.0, norm, 1.0, 1.0, (1.0,) * STATES, (0.0,) * STATES, substeps)

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fatigue_runner import shipped
-from fatigue_runner.corrector.artefact import Corrector, CorrectorError, load
-from fatigue_runner.errors import did_you_mean
+from fatigue_runner.corrector.artefact import load
+from fatigue_runner.corrector.corrector import Corrector
+from fatigue_runner.corrector.errors import CorrectorError
+from fatigue_runner.errors import InputError, did_you_mean
 
 SUFFIX = ".safetensors"
 
@@ -27,7 +29,7 @@ def correctors(more: Sequence[Path] = ()) -> list[Corrector]:
     for path in dict(sorted(files(more).items())).values():
         try:
             out.append(load(path))
-        except CorrectorError:
+        except InputError:
             continue
     return out
 

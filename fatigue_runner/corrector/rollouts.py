@@ -12,34 +12,34 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from fatigue_runner.corrector import samples
-from fatigue_runner.integrators import simulate_block
+from fatigue_runner.inputs.section import Section
+from fatigue_runner.integrators import Ensemble, Integrator, simulate
 
 if TYPE_CHECKING:
-    from fatigue_runner.corrector.artefact import Corrector
+    from fatigue_runner.corrector.corrector import Corrector
     from fatigue_runner.corrector.samples import Samples
     from fatigue_runner.turbine import Turbine
 
-Say = Callable[[str], None]
+Fit = TypeVar("Fit")  # what is fitted: a map
 DISCARD = 10.0  # s, the start of a run, which says little about the rest
 
 
-class RefineRecipe(BaseModel):
+class RefineRecipe(Section):
     """See the module."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     rounds: int = Field(default=2, ge=1, le=20)
     duration: float | None = Field(default=None, ge=2, le=1e4)
 
 
 @dataclass(frozen=True)
 class Ground:
-    """What rollouts run on: winds, their initial states (n, 16), samples of each, seed."""
+    """What rollouts run on: winds, their initial states (n, states), samples of each, seed."""
 
     winds: list[Any]
     start: Any
@@ -54,23 +54,14 @@ def visited(
     step = corrector.step
     # whole steps: between them lie values that the method never stepped from
     output = step if corrector.history else step * max(1, round(samples.GRID / step))
-    runs: list[Any] = []
-    winds: list[Any] = []
-    for key in dict.fromkeys(w.cell_key for w in ground.winds):
-        chosen = [i for i, w in enumerate(ground.winds) if w.cell_key == key]
-        block = simulate_block(
-            turbine, corrector.method, step, [ground.winds[i] for i in chosen], ground.start[chosen], duration, output,
-            corrector=corrector, mode="enhanced",
-        )  # fmt: skip
-        for i, run in zip(chosen, block, strict=True):
-            if run.diverged_at is None:
-                runs.append(run)
-                winds.append(ground.winds[i])
-    if not runs:
+    ensemble = Ensemble(turbine, ground.winds, ground.start, duration, output)
+    found = simulate(ensemble, Integrator(corrector.method, step, corrector))
+    whole = [(wind, run) for wind, run in zip(ground.winds, found, strict=True) if run.diverged_at is None]
+    if not whole:
         return None
-    return samples.collect(
-        turbine, corrector.method, step, winds, duration, ground.per_wind, 0.0, ground.seed + 1000 * number,
-        history=corrector.history, runs=runs,
+    winds, runs = zip(*whole, strict=True)
+    return samples.along(
+        turbine, corrector.method, step, winds, runs, ground.per_wind, 0.0, ground.seed + 1000 * number, corrector.history
     )  # fmt: skip
 
 
@@ -80,18 +71,18 @@ def union(a: Samples, b: Samples) -> Samples:
 
 
 def refine(
-    first: Corrector,
+    first: Fit,
     train: Samples,
     rounds: int,
-    refit: Callable[[Samples], Corrector],
-    visit: Callable[[Corrector, int], Samples | None],
-    judge: Callable[[Corrector], float],
-    say: Say = lambda what: None,
-) -> tuple[Corrector, Samples, dict[str, Any]]:
-    """The best corrector of all rounds, the samples that it was fitted to, and what to say of it.
+    refit: Callable[[Samples], Fit],
+    visit: Callable[[Fit, int], Samples | None],
+    judge: Callable[[Fit], float],
+    say: Callable[[str], None] = lambda what: None,
+) -> tuple[Fit, Samples, dict[str, Any]]:
+    """The best map of all rounds, the samples that it was fitted to, and what to say of it.
 
-    refit: samples to corrector; visit: corrector and number of the round to the samples that it meets; judge: error of whole runs
-    under winds that were not trained on.
+    refit: samples to map; visit: map and number of the round to the samples that it meets; judge: error of whole runs under winds
+    that were not trained on.
     """
     errors = [judge(first)]
     best, seen, all_seen, current = first, train, train, first

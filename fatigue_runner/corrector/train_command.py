@@ -41,22 +41,21 @@ def train(
 
         fatigue-runner train correctors/rk4-100ms.yaml --step 0.08 --name rk4-80ms --out runs
     """
-    from fatigue_runner.integrators.initial import initial_state
-
     to = console()
     overrides: dict[str, Any] = {"step": step, "seed": seed, "name": name}
     if tune:
-        settings = _tune(recipe, out, initial_state, overrides, tune, tune_epochs, to)
+        settings = _tune(recipe, out, overrides, tune, tune_epochs, to)
         if settings is None:
             raise typer.Exit(130)
         overrides |= {"training": settings, "seed": None}
-    _train(recipe, out, initial_state, overrides, to)
+    _train(recipe, out, overrides, to)
 
 
-def _train(recipe: Any, out: Any, initial_state: Any, overrides: dict[str, Any], console: Console) -> None:
+def _train(recipe: Path, out: Path | None, overrides: dict[str, Any], console: Console) -> None:
     """Train a recipe with a line of progress; a network's training can be stopped and goes on from its checkpoint."""
     from fatigue_runner.corrector.card import validation_rows
-    from fatigue_runner.corrector.recipes import train_file
+    from fatigue_runner.corrector.recipe import Progress
+    from fatigue_runner.corrector.train import train_file
 
     with console.status("making the samples") as status:
 
@@ -66,26 +65,24 @@ def _train(recipe: Any, out: Any, initial_state: Any, overrides: dict[str, Any],
             )
 
         checkpoint = (out or recipe.parent) / f".{overrides.get('name') or recipe.stem}.checkpoint"
-        made = train_file(recipe, out, initial_state, overrides, status.update, epoch, checkpoint)
+        made = train_file(recipe, out, overrides, Progress(status.update, epoch, checkpoint))
     if checkpoint.exists():
-        epochs = made.corrector.training["epochs"]
-        console.print(f"stopped after {epochs} epochs: the best so far is written, the same command goes on")
+        console.print("stopped: the best so far is written, the same command goes on")
     for label, value in validation_rows(made.corrector)[:7]:
         console.print(f"{label}: {value}")
     console.print(f"corrector: {made.path}\ncard: {made.card}")
 
 
 def _tune(
-    recipe: Any,
-    out: Any,
-    initial_state: Any,
+    recipe: Path,
+    out: Path | None,
     overrides: dict[str, Any],
     trials: int,
     epochs: int,
     console: Console,
 ) -> dict[str, Any] | None:
     """Search for a network's settings, a line per trial; None where Ctrl-C ended it: the same command goes on."""
-    from fatigue_runner.corrector.training_recipe import tune_file
+    from fatigue_runner.corrector.train import tune_file
 
     def trial(report: Any) -> None:
         value = "-" if report.value is None else f"{report.value:.3e}"
@@ -96,6 +93,6 @@ def _tune(
 
     storage = (out or recipe.parent) / f".{overrides.get('name') or recipe.stem}.tuning.db"
     with console.status(f"{trials} trials of {epochs} epochs (Ctrl-C ends, the same command goes on)"):
-        settings, stopped = tune_file(recipe, storage, initial_state, trials, epochs, overrides, trial)
+        settings, stopped = tune_file(recipe, storage, trials, epochs, overrides, trial)
     console.print("best: " + ", ".join(f"{k}: {v}" for k, v in settings.items()))
     return None if stopped else settings

@@ -9,6 +9,7 @@ import numpy as np
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.integrators import exponential_adams as adams
+from fatigue_runner.integrators.protocol import Guard, RawNetworkData, StepCorrector
 from fatigue_runner.integrators.tableaux import ButcherTableau
 
 if TYPE_CHECKING:
@@ -59,7 +60,12 @@ class Correcting:
 
 
 def prepare_exponential(
-    corrector: Any, turbine: Turbine, method: adams.ExponentialAdams, step: float, mode: str, pitch: float
+    corrector: StepCorrector | None,
+    turbine: Turbine,
+    method: adams.ExponentialAdams,
+    step: float,
+    mode: str,
+    pitch: float,
 ) -> Correcting:
     """An exponential Adams method at this step and pitch [rad], plain (corrector None) or with a learned part. Raises as `prepare`."""
     if corrector is None:
@@ -71,18 +77,13 @@ def prepare_exponential(
     if mode not in MODES:
         raise InputError(f"unknown mode {mode!r}{did_you_mean(mode, MODES)}")
     corrector.bind(turbine, method.name, step)
-    past = corrector.past
-    ahead, plain = adams.matrices(turbine, method, step, pitch, past, corrector.damping)
-    learned_ahead, learned, factors = corrector.matrices()
-    whole = learned.copy()
-    whole[:, : plain.shape[1]] += plain
-    guard = corrector.guard
-    units = guard_units(corrector.ahead_atol, guard.rtol), guard_units(guard.atol, guard.rtol)
+    past, guard = corrector.past, corrector.guard
+    units = guard_units(guard.ahead_atol, guard.rtol), guard_units(guard.atol, guard.rtol)
     safety = (mode == "hybrid", *units, float(guard.limit), _norm(guard))
-    return Correcting(
-        adams.loop_data(turbine, pitch, past, corrector.damping), adams.network((ahead + learned_ahead, ahead), (whole, plain), factors),
-        safety, float(guard.limit), 0, past, (method.past - 1, past - 1), 4 * adams.STARTING,
-    )  # fmt: skip
+    data = adams.loop_data(turbine, pitch, past, corrector.damping)
+    learned = tuple(corrector.map_data(turbine, pitch))
+    starting = method.past - 1, past - 1
+    return Correcting(data, learned, safety, float(guard.limit), 0, past, starting, 4 * adams.STARTING)
 
 
 def guard_units(atol: tuple[float, ...], rtol: tuple[float, ...]) -> tuple[Any, Any]:
@@ -93,14 +94,24 @@ def guard_units(atol: tuple[float, ...], rtol: tuple[float, ...]) -> tuple[Any, 
     return inverse, np.repeat(np.array(rtol), LANES) * inverse if any(rtol) else np.zeros(0)
 
 
-def _norm(guard: Any) -> int:
+def _norm(guard: Guard) -> int:
     from fatigue_runner.integrators.corrected import NORM_MAX, NORM_RMS
 
     return NORM_MAX if guard.norm == "max" else NORM_RMS
 
 
-def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: float, mode: str) -> Correcting:
-    """Bind a `corrector.Corrector` to a run. Raises InputError for an unknown mode, CorrectorError where it does not fit."""
+def _network(data: Any) -> tuple[Any, ...]:
+    """`network` of `correction.correction`."""
+    if isinstance(data, RawNetworkData):
+        nothing = np.zeros(0)
+        return True, 1.0, 0, nothing.astype(np.int64), nothing, *data
+    return False, *data
+
+
+def prepare(
+    corrector: StepCorrector, turbine: Turbine, method: ButcherTableau, step: float, mode: str
+) -> Correcting:
+    """Bind a corrector to a run. Raises InputError for an unknown mode, CorrectorError where it does not fit."""
     from fatigue_runner.integrators.corrected import STARTING
     from fatigue_runner.integrators.kernel_data import runge_kutta_data, stage_rows
     from fatigue_runner.integrators.methods import method as find_method
@@ -130,7 +141,7 @@ def prepare(corrector: Any, turbine: Turbine, method: ButcherTableau, step: floa
     units = guard_units(guard.atol, guard.rtol)
     bounds = np.array(guard.low), np.array(guard.high)
     safety = (mode == "hybrid", fallback, units, float(guard.limit), _norm(guard), bounds)
-    network = corrector.kernel_network(turbine.parameters["g_ratio"])
+    network = _network(corrector.map_data(turbine))
     return Correcting(
         (*data[:2], rows), network, safety, float(guard.limit), extra,
         starting=(0, corrector.history), extra_at_start=STARTING * stages - 1,

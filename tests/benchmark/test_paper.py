@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,9 @@ import pytest
 from fatigue_runner.benchmark.pages import paper as page
 from fatigue_runner.benchmark.pages.paper_figures import draw
 from fatigue_runner.benchmark.study import paper
-from fatigue_runner.corrector.artefact import Corrector, Guard
+from fatigue_runner.corrector import Corrector, Guard
+from fatigue_runner.corrector.binding import Binding
+from fatigue_runner.corrector.maps import RawNetwork
 from fatigue_runner.turbine import load_turbine
 
 CAMPAIGN = {
@@ -29,10 +30,11 @@ def measured():
     turbine = load_turbine("t2b1i1cg")
     guard = Guard(0.0, "max", 1.0, 1.0, (1e-6,) * 16, (0.0,) * 16)
     # a network that gives nothing, and a guard that trusts nothing
-    idle = Corrector(
-        "idle", "mlp", "heun", 0.01, turbine.name, turbine.hash, "raw", (), None, (np.zeros((16, 18)),), "relu", guard
-    )  # fmt: skip
-    return paper.measure(CAMPAIGN, [idle, replace(idle, step=0.005)], paper.BOXED)
+    network = RawNetwork((np.zeros((16, 18)),))
+    idle = [
+        Corrector("idle", "mlp", Binding.to(turbine, "heun", step), network, guard) for step in (0.01, 0.005)
+    ]
+    return paper.measure(CAMPAIGN, idle, paper.BOXED)
 
 
 def outcome(measured, label, step):

@@ -60,16 +60,12 @@ def test_the_shipped_campaign_has_turbulent_and_constant_winds_of_reserved_seeds
 
 
 def test_no_training_wind_has_a_seed_of_the_benchmarks():
-    import ruamel.yaml
+    from fatigue_runner.corrector.train import read_recipe
 
-    from fatigue_runner.corrector.affine_recipe import parse_affine
-
-    yaml = ruamel.yaml.YAML(typ="safe")
     found = 0
     for path in CORRECTORS.glob("*.yaml"):
-        data = yaml.load(path)
-        if data.get("family") == "affine" and data["training"].get("type") == "turbulent":
-            recipe = parse_affine(data)
+        recipe, _ = read_recipe(path)
+        if recipe.family == "affine" and recipe.training.type == "turbulent":
             for section in (recipe.training, recipe.validation):
                 assert not {w.parameters["seed"] for w in section.build()} & set(SEEDS)
                 found += 1

@@ -8,8 +8,9 @@ from functools import cache
 
 import numpy as np
 
-from fatigue_runner.corrector import features, fit, guard, samples
-from fatigue_runner.corrector.artefact import Corrector, Guard
+from fatigue_runner.corrector import Corrector, features, fit, samples, threshold
+from fatigue_runner.corrector.binding import Binding
+from fatigue_runner.corrector.maps import RawNetwork, StageMap
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind
 
@@ -21,36 +22,46 @@ def turbine():
     return load_turbine("nrel5mw")
 
 
+def operating_points(winds):
+    return np.array([turbine().operating_point(w.mean_speed) for w in winds])
+
+
+def collect(method, step, winds, duration, per_wind, perturbation, seed, history=0, initial=None):
+    """Samples along accurate trajectories from the winds' operating points."""
+    start = operating_points(winds) if initial is None else initial
+    grid = samples.output_step(step, history)
+    runs = samples.references(turbine(), winds, start, duration, grid)
+    return samples.along(turbine(), method, step, winds, runs, per_wind, perturbation, seed, history)
+
+
 @cache
 def training_samples(method="heun", step=0.02, history=0):
     winds = [ConstantWind(v, 0.1, 0.02) for v in SPEEDS]
-    return samples.collect(turbine(), method, step, winds, 15.0, 400, 1e-5, 0, history=history)
+    return collect(method, step, winds, 15.0, 400, 1e-5, 0, history)
 
 
 @cache
 def trained(method="heun", step=0.02, factors=(), history=0, substeps=None) -> Corrector:
-    found = training_samples(method, step, history)
-    size = step ** (samples.tableau(method).order + 1)
-    weights = fit.affine(found.features(features.STAGE_AWARE, factors), found.defect) / size
-    t = turbine()
-    open_guard = Guard(0.0, "max", 1.0, 1.0, (1.0,) * 16, (0.0,) * 16, 2)
-    out = Corrector(
-        name="example", family="affine", method=method, step=step, turbine=t.name, turbine_hash=t.hash,
-        kind=features.STAGE_AWARE, factors=factors, linear=weights, layers=(), activation="identity",
-        guard=open_guard, wind_range=(6.0, 9.0), history=history,
-    )  # fmt: skip
-    return replace(out, guard=guard.from_training_set(out, t, found, substeps=substeps))
+    found, binding = training_samples(method, step, history), Binding.to(turbine(), method, step)
+    weights = fit.affine(found.multiplied(factors), found.defect) / binding.size
+    learned = StageMap(weights, factors=factors, history=history)
+    guard = threshold.from_training_set(learned, binding, turbine(), found, substeps=substeps)
+    return Corrector("example", "affine", binding, learned, guard, (6.0, 9.0))
+
+
+def with_map(corrector: Corrector, **changed) -> Corrector:
+    return replace(corrector, map=replace(corrector.map, **changed))
 
 
 def with_weights(corrector: Corrector, weights) -> Corrector:
-    return replace(corrector, linear=np.asarray(weights, float))
+    return with_map(corrector, linear=np.asarray(weights, float))
 
 
 def network(raw: bool, activation="isru", seed=0) -> Corrector:
     """Random layers of moderate size, for comparing the compiled network with numpy's."""
     rng = np.random.default_rng(seed)
-    inputs = 18 if raw else len(features.names(features.STAGE_AWARE, 2))
-    sizes = (inputs - 1, 13, 24, 16)
+    inputs = len(features.raw() if raw else features.stage_aware(2)) - 1
+    sizes = (inputs, 13, 24, features.STATES)
     layers = tuple(rng.normal(size=(b, a + 1)) / (10 * a) for a, b in itertools.pairwise(sizes))
-    kind = features.RAW if raw else features.STAGE_AWARE
-    return replace(trained(), family="test", kind=kind, linear=None, layers=layers, activation=activation)
+    learned = RawNetwork(layers, activation) if raw else StageMap(None, layers, activation)
+    return replace(trained(), family="test", map=learned)

@@ -6,11 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from corrector_example import network, trained, training_samples, turbine, with_weights
+from corrector_example import (
+    collect,
+    network,
+    operating_points,
+    trained,
+    training_samples,
+    turbine,
+    with_weights,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fatigue_runner.corrector import features, guard, samples
+from fatigue_runner.corrector import coordinates, features, samples, threshold
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import simulate_block
 from fatigue_runner.wind import ConstantWind, TurbulentWind
@@ -88,7 +96,7 @@ def test_a_corrector_that_looks_back_sees_the_slopes_of_the_steps_before():
     pieces = np.zeros((1, 1, 4, 3))
     pieces[0, 0, 0] = 7.4, 0.1, 0.02
     now = samples.single_steps(turbine(), "rk4", 0.1, ran.state[1:2], pieces)
-    before = 0.1 * samples.accelerations(turbine(), ran)[0]
+    before = 0.1 * coordinates.accelerations(turbine(), ran.state, ran.wind)[0]
     now.rows = np.concatenate([now.rows, before[None]], axis=1)
     assert ran.state[2] == pytest.approx((now.plain + corrector.predict(now))[0], rel=1e-10, abs=1e-10)
     assert np.abs(corrector.predict(now)).max() > 1e-7
@@ -111,7 +119,7 @@ class TestTheHybrid:
 
     def wrong(self, kind: str):
         corrector = trained()
-        weights = corrector.linear
+        weights = corrector.map.linear
         if kind == "untrained":
             return with_weights(corrector, 0 * weights)
         if kind == "deliberately wrong":
@@ -132,10 +140,10 @@ class TestTheHybrid:
     def test_refuses_a_correction_that_is_no_number(self):
         """NaN weights cannot be loaded; here they go around the check, as a broken memory would."""
         bad = trained()
-        weights = bad.linear.copy()
+        weights = bad.map.linear.copy()
         weights[13, 3] = np.nan
         broken = replace(bad)
-        object.__setattr__(broken, "linear", weights)
+        object.__setattr__(broken, "map", replace(bad.map, linear=weights))
         hybrid, fallback = run(broken, "hybrid", duration=2.0), run(method="rk3", duration=2.0)
         assert not hybrid.accepted.any()
         np.testing.assert_array_equal(hybrid.state, fallback.state)
@@ -147,7 +155,7 @@ class TestTheHybrid:
         assert np.all((hybrid.discrepancy <= hybrid.threshold) == hybrid.accepted)
 
     def test_takes_substeps_of_the_base_method_where_the_full_step_is_unstable(self):
-        corrector = with_weights(trained("rk4", 0.2), 1e3 * trained("rk4", 0.2).linear)
+        corrector = with_weights(trained("rk4", 0.2), 1e3 * trained("rk4", 0.2).map.linear)
         assert corrector.guard.substeps == 2
         hybrid = run(corrector, "hybrid", "rk4", 0.2, 4.0)
         halves = run(method="rk4", step=0.1, duration=4.0, output=0.2)
@@ -161,13 +169,13 @@ class TestTheHybrid:
     )  # fmt: skip
     def test_is_never_further_than_the_limit_from_the_fallback(self, size, column, row, limit, norm, rtol):
         good = trained()
-        weights = good.linear.copy()
+        weights = good.map.linear.copy()
         weights[row, column] += size
         g = replace(good.guard, limit=limit, norm=norm, rtol=(rtol,) * 16)
         x = start() * (1 + 1e-3)
-        hybrid = run(replace(good, linear=weights, guard=g), "hybrid", duration=0.02, x=x)
+        hybrid = run(replace(with_weights(good, weights), guard=g), "hybrid", duration=0.02, x=x)
         fallback = run(method="rk3", duration=0.02, x=x).state[-1]
-        away = guard.distances((hybrid.state[-1] - fallback)[None], x, fallback[None], g)[0]
+        away = threshold.distances((hybrid.state[-1] - fallback)[None], x, fallback[None], g)[0]
         assert away <= limit * (1 + 1e-9) + 1e-9 / min(g.atol) * 1e-6
         if not hybrid.accepted[0]:
             np.testing.assert_array_equal(hybrid.state[-1], fallback)
@@ -176,7 +184,7 @@ class TestTheHybrid:
 @pytest.mark.parametrize("mode", ["enhanced", "hybrid"])
 def test_a_corrected_case_does_not_depend_on_its_neighbours(mode):
     winds = [TurbulentWind(7.0 + 0.1 * i, intensity=0.14, seed=i, duration=5.0) for i in range(18)]
-    x = samples.operating_points(turbine(), winds)
+    x = operating_points(winds)
     corrector = trained("rk4", 0.1)
     together = simulate_block(turbine(), "rk4", 0.1, winds, x, 3.0, None, corrector=corrector, mode=mode)
     for i in (0, 5, 17):
@@ -251,30 +259,32 @@ class TestSamples:
             assert np.polyval(piece[::-1], u) == pytest.approx(wind.at(np.array([2.05 + u]))[0], abs=1e-12)
 
     def test_the_same_seed_gives_the_same_samples(self):
-        def collect(seed):
-            return samples.collect(turbine(), "heun", 0.02, [UNSEEN], 3.0, 20, 1e-5, seed)
+        def rows(seed):
+            return collect("heun", 0.02, [UNSEEN], 3.0, 20, 1e-5, seed).rows
 
-        np.testing.assert_array_equal(collect(1).rows, collect(1).rows)
-        assert not np.array_equal(collect(1).rows, collect(2).rows)
+        np.testing.assert_array_equal(rows(1), rows(1))
+        assert not np.array_equal(rows(1), rows(2))
 
     def test_a_diverging_reference_is_refused_by_name(self):
         with pytest.raises(
             InputError, match=r"training wind constant-7.4.* diverged at .* leave this wind out"
         ):
-            samples.collect(turbine(), "heun", 0.02, [UNSEEN], 3.0, 20, 1e-5, 0, initial=start() * 1e5)
+            collect("heun", 0.02, [UNSEEN], 3.0, 20, 1e-5, 0, initial=start() * 1e5)
 
     def test_features_are_named_one_by_one(self):
-        assert training_samples().rows.shape[1] == len(features.names(features.STAGE_AWARE, 2))
+        assert training_samples().rows.shape[1] == len(features.stage_aware(2))
         looking_back = training_samples("rk4", 0.1, 1)
-        assert looking_back.rows.shape[1] == len(features.names(features.STAGE_AWARE, 4, (), 1))
+        assert looking_back.rows.shape[1] == len(features.stage_aware(4, 1))
 
 
 def test_the_limit_is_kappa_times_the_largest_distance_of_the_training_set():
     corrector, found = trained(), training_samples()
-    other = guard.fallback_results(turbine(), "heun", 0.02, 0, found)
-    away = guard.distances(
+    other = threshold.fallback_results(turbine(), "heun", 0.02, 0, found)
+    away = threshold.distances(
         found.plain + corrector.predict(found) - other, found.state, other, corrector.guard
     )
     assert corrector.guard.limit == pytest.approx(2.0 * away.max())
-    half = guard.from_training_set(corrector, turbine(), found, kappa=1.0, quantile=0.5)
+    half = threshold.from_training_set(
+        corrector.map, corrector.binding, turbine(), found, kappa=1.0, quantile=0.5
+    )
     assert (away <= half.limit).mean() == pytest.approx(0.5, abs=0.01)

@@ -6,15 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from corrector_example import trained, training_samples, turbine
+from corrector_example import collect, operating_points, trained, training_samples, turbine, with_map
 from typer.testing import CliRunner
 
 from fatigue_runner.cli import app
-from fatigue_runner.corrector import affine_net, recipes, rollouts, samples
-from fatigue_runner.corrector.affine_recipe import DRIVE
-from fatigue_runner.corrector.artefact import load
+from fatigue_runner.corrector import load, rollouts, samples
+from fatigue_runner.corrector.families import affine_net
+from fatigue_runner.corrector.features import DRIVE
+from fatigue_runner.corrector.recipe import Progress
+from fatigue_runner.corrector.train import train_file
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import simulate_block
+from fatigue_runner.integrators.initial import initial_state
 from fatigue_runner.wind import ConstantWind
 
 torch = pytest.importorskip("torch", reason="networks are trained with PyTorch")
@@ -24,6 +27,7 @@ name: tiny
 family: affine+net
 method: heun
 step: 0.05
+initial: paper-spinning
 training: {type: constant, speeds: [6, 7, 8, 9], vertical_shear: [0.1], duration: 15}
 validation: {type: constant, speeds: [7.4], vertical_shear: [0.1], duration: 10}
 samples: 200
@@ -40,15 +44,16 @@ def recipe(folder, change=lambda text: text):
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     told = []
-    found = recipes.train_file(recipe(tmp_path_factory.mktemp("network")), None, None, progress=told.append)
+    found = train_file(recipe(tmp_path_factory.mktemp("network")), progress=Progress(epoch=told.append))
     return found, told
 
 
 def test_the_network_leaves_less_of_unseen_defects_than_the_affine_map_below_it(made):
     corrector = made[0].corrector
     winds = [ConstantWind(7.4, 0.1)]
-    unseen = samples.collect(turbine(), "heun", 0.05, winds, 10.0, 200, 1e-5, 7)
-    affine = replace(corrector, layers=(), activation="identity")
+    start = initial_state(turbine(), "paper-spinning", winds[0])[None]
+    unseen = collect("heun", 0.05, winds, 10.0, 200, 1e-5, 7, initial=start)
+    affine = with_map(corrector, layers=(), activation="identity")
     left = [
         np.median(np.abs(c.predict(unseen) - unseen.defect), axis=0)[list(DRIVE)] for c in (affine, corrector)
     ]
@@ -58,13 +63,13 @@ def test_the_network_leaves_less_of_unseen_defects_than_the_affine_map_below_it(
 def test_a_compiled_step_adds_the_defect_that_predict_says(made):
     corrector = load(made[0].path)
     wind = ConstantWind(7.4, 0.1)
-    start = samples.operating_points(turbine(), [wind])
+    start = operating_points([wind])
     (run,) = simulate_block(turbine(), "heun", 0.05, [wind], start, 2.0, corrector=corrector)
     pieces = samples.wind_pieces(wind, run.time[:-1], 0.05)
     steps = samples.single_steps(turbine(), "heun", 0.05, run.state[:-1], pieces)
     difference = np.abs(steps.plain + corrector.predict(steps) - run.state[1:])
     assert (difference <= 1e-12 * (1 + np.abs(run.state[1:]))).all()
-    assert np.abs(corrector.predict(steps) - replace(corrector, layers=()).predict(steps)).max() > 1e-9
+    assert np.abs(corrector.predict(steps) - with_map(corrector, layers=()).predict(steps)).max() > 1e-9
 
 
 def test_every_epoch_is_told_and_the_best_one_kept(made):
@@ -76,12 +81,12 @@ def test_every_epoch_is_told_and_the_best_one_kept(made):
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_one_others(made, tmp_path):
-    again = recipes.train_file(recipe(tmp_path), None, None).corrector
-    for a, b in zip(again.layers, made[0].corrector.layers, strict=True):
+    again = train_file(recipe(tmp_path)).corrector
+    for a, b in zip(again.map.layers, made[0].corrector.map.layers, strict=True):
         np.testing.assert_array_equal(a, b)
-    other = recipes.train_file(recipe(tmp_path, lambda t: t.replace("0.01}", "0.01, seed: 1}")), None, None)
-    np.testing.assert_array_equal(other.corrector.linear, again.linear)
-    assert not np.array_equal(other.corrector.layers[0], again.layers[0])
+    other = train_file(recipe(tmp_path, lambda t: t.replace("0.01}", "0.01, seed: 1}")))
+    np.testing.assert_array_equal(other.corrector.map.linear, again.map.linear)
+    assert not np.array_equal(other.corrector.map.layers[0], again.map.layers[0])
 
 
 def test_training_leaves_the_callers_random_numbers_and_threads_alone():
@@ -89,7 +94,8 @@ def test_training_leaves_the_callers_random_numbers_and_threads_alone():
     expected, threads = torch.rand(1).item(), torch.get_num_threads()
     torch.manual_seed(5)
     settings = affine_net.NetworkRecipe(hidden=[4], epochs=1)
-    affine_net.add(trained(), training_samples(), training_samples(), settings, DRIVE)
+    size = trained().binding.size
+    affine_net.add(trained().map, size, training_samples(), training_samples(), settings, DRIVE)
     assert torch.rand(1).item() == expected
     assert torch.get_num_threads() == threads
 
@@ -115,20 +121,20 @@ def test_a_step_that_nothing_can_follow_hardly_pulls():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda t: t.replace("hidden:", "hiden:"), "unknown key 'network.hiden'; did you mean 'hidden'"),
-        (lambda t: t.replace("hidden: [8]", "hidden: []"), "network.hidden: List should have at least 1 item"),
-        (lambda t: t.replace("hidden: [8]", "hidden: [8, 900]"), "network.hidden: hidden layers have 1 to 256 units"),
-        (lambda t: t.replace("epochs: 12", "epochs: 0"), "network.epochs: Input should be greater than or equal to 1"),
-        (lambda t: t.replace("affine+net", "affine"), "network: the key belongs to family affine+net"),
-        (lambda t: t[: t.index("network")], "network: the key belongs to family affine+net"),
+        (lambda t: t.replace("hidden:", "hiden:"), "tiny.yaml:10: unknown key 'hiden' in network; did you mean 'hidden'"),
+        (lambda t: t.replace("hidden: [8]", "hidden: []"), "network.hidden must hold at least 1 value"),
+        (lambda t: t.replace("hidden: [8]", "hidden: [8, 900]"), "network.hidden: hidden layers have 1 to 500 units"),
+        (lambda t: t.replace("epochs: 12", "epochs: 0"), "tiny.yaml:10: network.epochs must be at least 1; got 0"),
+        (lambda t: t.replace("affine+net", "affine"), "network: the key belongs to family affine+net of runge-kutta methods; leave it out"),
+        (lambda t: t[: t.index("network")], "key 'network' is missing"),
         (lambda t: t.replace("affine+net", "affin+net"), "unknown family 'affin+net'; did you mean 'affine+net'"),
-        (lambda t: t + "refine: {round: 2}\n", "unknown key 'refine.round'; did you mean 'rounds'"),
-        (lambda t: t.replace("method: heun", "method: etdabm3"), "network: correctors of etdabm3 are two matrices"),
+        (lambda t: t + "refine: {round: 2}\n", "unknown key 'round' in refine; did you mean 'rounds'"),
+        (lambda t: t.replace("method: heun", "method: etdabm3"), "etdabm3 is one of the exponential-adams methods; for those"),
     ],
 )  # fmt: skip
 def test_a_wrong_recipe_is_refused_with_the_file_the_key_and_the_way_out(tmp_path, change, words):
     with pytest.raises(InputError) as caught:
-        recipes.train_file(recipe(tmp_path, change), None, None)
+        train_file(recipe(tmp_path, change))
     assert words in str(caught.value)
     assert str(tmp_path / "tiny.yaml") in str(caught.value)
     assert not list(tmp_path.glob("*.safetensors"))
@@ -167,7 +173,7 @@ class TestRefinement:
     def test_samples_lie_on_the_states_that_the_corrected_method_steps_from(self, history):
         corrector = trained("rk4", 0.1, history=history)
         wind = ConstantWind(7.4, 0.1)
-        start = samples.operating_points(turbine(), [wind])
+        start = operating_points([wind])
         ground = rollouts.Ground([wind], start, 20, 3)
         found = rollouts.visited(turbine(), corrector, ground, 4.0, 1)
         assert found is not None
@@ -183,6 +189,6 @@ class TestRefinement:
                 + "refine: {rounds: 1, duration: 5}\n"
             )
 
-        found = recipes.train_file(recipe(tmp_path, refined), None, None).corrector
+        found = train_file(recipe(tmp_path, refined)).corrector
         assert found.training["refinement"].startswith("validation NRMSE")
         assert "refinement: validation NRMSE" in (tmp_path / "tiny.md").read_text()

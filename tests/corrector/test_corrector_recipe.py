@@ -7,9 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from fatigue_runner.cli import app
-from fatigue_runner.corrector import fit, recipes
-from fatigue_runner.corrector.affine_recipe import parse_affine
-from fatigue_runner.corrector.artefact import load
+from fatigue_runner.corrector import fit, load
+from fatigue_runner.corrector.train import read_recipe, train_file
 from fatigue_runner.errors import InputError
 
 RECIPE = """
@@ -32,7 +31,7 @@ def recipe(tmp_path, change=lambda text: text):
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("correctors")
-    return recipes.train_file(recipe(folder), None, None)
+    return train_file(recipe(folder))
 
 
 def test_a_recipe_gives_a_corrector_that_beats_its_method_on_winds_it_has_not_seen(made):
@@ -56,51 +55,51 @@ def test_the_card_says_how_it_was_made_and_how_good_it_is(made):
 
 
 def test_the_same_recipe_gives_the_same_bits_and_another_seed_others(made, tmp_path):
-    again = recipes.train_file(recipe(tmp_path), None, None).corrector
-    np.testing.assert_array_equal(again.linear, made.corrector.linear)
+    again = train_file(recipe(tmp_path)).corrector
+    np.testing.assert_array_equal(again.map.linear, made.corrector.map.linear)
     assert again.guard == made.corrector.guard
-    other = recipes.train_file(recipe(tmp_path), None, None, {"seed": 1}).corrector
-    assert not np.array_equal(other.linear, made.corrector.linear)
+    other = train_file(recipe(tmp_path), overrides={"seed": 1}).corrector
+    assert not np.array_equal(other.map.linear, made.corrector.map.linear)
     assert "seed: 1" in other.recipe
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda t: t.replace("samples:", "sampels:"), "unknown key 'sampels'; did you mean 'samples'"),
-        (lambda t: t.replace("vertical_shear", "vertikal_shear"), "unknown key 'training.vertikal_shear'; did you mean 'vertical_shear'"),
+        (lambda t: t.replace("samples:", "sampels:"), "quick.yaml:8: unknown key 'sampels'; did you mean 'samples'"),
+        (lambda t: t.replace("vertical_shear", "vertikal_shear"), "quick.yaml:6: unknown key 'vertikal_shear' in training; did you mean"),
         (lambda t: t + "factors: [wind_sped@start]\n", "unknown feature factor 'wind_sped@start'; did you mean 'wind_speed@start'"),
-        (lambda t: t.replace("family: affine", "family: afine"), "unknown family 'afine'; did you mean 'affine'"),
+        (lambda t: t.replace("family: affine", "family: afine"), "quick.yaml:3: unknown family 'afine'; did you mean 'affine'"),
         (lambda t: t.replace("family: affine\n", ""), "key 'family' is missing; known: affine, affine+net, mlp"),
-        (lambda t: t.replace("method: heun", "method: hein"), "unknown integrator 'hein'; did you mean 'heun'"),
+        (lambda t: t.replace("method: heun", "method: hein"), "quick.yaml:4: method: unknown integrator 'hein'; did you mean 'heun'"),
         (lambda t: t.replace("method: heun", "method: ab4"), "correctors exist for Runge-Kutta and exponential Adams methods"),
-        (lambda t: t.replace("step: 0.02", "step: -1"), "step: Input should be greater than 0"),
-        (lambda t: t.replace("step: 0.02\n", ""), "step: Field required"),
+        (lambda t: t.replace("step: 0.02", "step: -1"), "quick.yaml:5: step must be above 0; got -1"),
+        (lambda t: t.replace("step: 0.02\n", ""), "key 'step' is missing"),
         (
             lambda t: t.replace("speeds: [7.4]", "speeds: [6, 7, 8, 9]").replace("duration: 10", "duration: 15"),
-            "validation must hold other winds",
+            "quick.yaml:7: validation: must hold other winds",
         ),
-        (lambda t: t.replace("samples: 300", "samples: ["), "cannot be read"),
-        (lambda t: "[1, 2]", "holds no recipe"),
-        (lambda t: t.replace("duration: 15", "duration: 0.02"), "training.duration: Input should be greater than or equal to 2"),
+        (lambda t: t.replace("samples: 300", "samples: ["), "not valid YAML"),
+        (lambda t: "[1, 2]", "a recipe is a mapping of keys (name, family, method"),
+        (lambda t: t.replace("duration: 15", "duration: 0.02"), "training.duration must be at least 2; got 0.02"),
         (lambda t: t + "turbine: nrel5mv\n", "nrel5mv"),
     ],
 )  # fmt: skip
 def test_a_wrong_recipe_is_refused_with_the_file_and_the_way_out(tmp_path, change, words):
     with pytest.raises(InputError) as caught:
-        recipes.train_file(recipe(tmp_path, change), None, None)
+        train_file(recipe(tmp_path, change))
     assert words in str(caught.value)
     assert not list(tmp_path.glob("*.safetensors"))
 
 
 def test_a_missing_recipe_is_refused(tmp_path):
     with pytest.raises(InputError, match="no such file"):
-        recipes.train_file(tmp_path / "none.yaml", None, None)
+        train_file(tmp_path / "none.yaml")
 
 
 def test_turbulent_winds_of_a_recipe_are_the_same_each_time_and_differ_from_those_of_validation():
     part = {"speeds": {"start": 5, "stop": 10, "count": 3}, "duration": 10}
-    parsed = parse_affine(
+    parsed, _ = read_recipe(
         {
             "name": "x",
             "family": "affine",

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from fatigue_runner.corrector.training_data import Pairs
+from fatigue_runner.corrector.network.pairs import Pairs
+from fatigue_runner.corrector.network.settings import NetworkSettings
 from fatigue_runner.errors import InputError
 
 pytest.importorskip("torch", reason="training needs the extra `train`")
 pytest.importorskip("optuna", reason="tuning needs the extra `train`")
 
-from fatigue_runner.corrector.training import MlpSettings, train_mlp
-from fatigue_runner.corrector.tuning import tune
+from fatigue_runner.corrector.network.training import train_scaled
+from fatigue_runner.corrector.network.tuning import tune
 
 
 def problem(n: int, seed: int) -> Pairs:
@@ -23,7 +22,7 @@ def problem(n: int, seed: int) -> Pairs:
 
 
 TRAIN, VALIDATION = problem(256, 0), problem(64, 1)
-BASE = MlpSettings(hidden=(8,), epochs=50, weight_decay=0.0)
+BASE = NetworkSettings(hidden=(8,), epochs=50, weight_decay=0.0)
 
 
 def test_the_best_of_the_trials_by_validation_loss_is_taken_and_its_loss_is_that_of_its_settings(tmp_path):
@@ -31,7 +30,7 @@ def test_the_best_of_the_trials_by_validation_loss_is_taken_and_its_loss_is_that
     assert len(tuned.trials) == 4 and not tuned.stopped
     best = min((t for t in tuned.trials if t.state == "complete"), key=lambda t: t.value)
     assert {k: getattr(tuned.settings, k) for k in best.settings} == best.settings
-    _, history = train_mlp(TRAIN, VALIDATION, replace(tuned.settings, epochs=3))
+    _, history = train_scaled(TRAIN, VALIDATION, tuned.settings.but(epochs=3))
     assert history.best == best.value
     assert tuned.settings.epochs == 50
 
@@ -44,7 +43,7 @@ def test_a_stopped_search_goes_on_with_the_trials_that_are_left(tmp_path, monkey
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("fatigue_runner.corrector.training._Run.report", interrupted)
+        patch.setattr("fatigue_runner.corrector.network.training._Run.report", interrupted)
         stopped = tune(TRAIN, VALIDATION, BASE, trials=3, epochs=2, storage=path)
     assert stopped.stopped and [t.state for t in stopped.trials] == ["complete", "failed"]
     seen = []

@@ -1,4 +1,4 @@
-"""Training of a network on defects: AdamW, mini-batches, a falling learning rate; the one module that imports PyTorch."""
+"""The one training loop of networks: AdamW, mini-batches, a falling learning rate, checkpoints; the one module that imports PyTorch."""
 
 from __future__ import annotations
 
@@ -18,63 +18,38 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from fatigue_runner.corrector.training_data import Pairs, Scaling, fold
-from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.corrector.network.pairs import Pairs, Scaling, fold
+from fatigue_runner.corrector.network.settings import NetworkSettings
+from fatigue_runner.errors import InputError
 
 Array = NDArray[np.float64]
 Progress = Callable[[dict[str, float]], None]
 
-SCHEDULERS = ("plateau", "cosine", "exponential")
-ACTIVATIONS = ("relu", "isru")
+Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+
 SAVE_EVERY = 20.0  # s between checkpoints: a kill costs no more than this
 
 
-@dataclass(frozen=True)
-class MlpSettings:
-    """How a network is made and trained; the defaults are the paper's sizes.
+def mean_squares(result: torch.Tensor, target: torch.Tensor) -> torch.Tensor:
+    return torch.nn.functional.mse_loss(result, target)
 
-    Training ends after `epochs`, or when the plateau scheduler has brought the learning rate to `smallest_rate`.
-    `patience` counts epochs without a better validation loss before the rate is multiplied with `factor`; the other
-    schedulers fall from `learning_rate` to `smallest_rate` over all epochs. `threads`: of PyTorch on a processor (0: its own
-    choice).
+
+@dataclass(frozen=True)
+class Problem:
+    """What a network is to learn, in the units in which it is trained: samples, others that judge it, and the loss of (result, target).
+
+    from_zero: the network begins as the map that is zero everywhere, which counts as epoch 0; else with random layers.
     """
 
-    hidden: tuple[int, ...] = (111, 111, 111)
-    activation: str = "relu"
-    batch: int = 256
-    learning_rate: float = 2e-3
-    smallest_rate: float = 1e-6
-    scheduler: str = "plateau"
-    factor: float = 0.5
-    patience: int = 100
-    weight_decay: float = 1e-4
-    epochs: int = 20000
-    seed: int = 0
-    precision: str = "float32"
-    threads: int = 1
-
-    def __post_init__(self) -> None:
-        for name, value, known in (
-            ("scheduler", self.scheduler, SCHEDULERS),
-            ("activation", self.activation, ACTIVATIONS),
-            ("precision", self.precision, ("float32", "float64")),
-        ):
-            if value not in known:
-                raise InputError(f"training: unknown {name} {value!r}{did_you_mean(value, known)}")
-        for name in ("batch", "learning_rate", "smallest_rate", "patience", "epochs"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"training: {name} must be positive, got {getattr(self, name)}")
-        if not (0 < self.factor < 1 and self.smallest_rate <= self.learning_rate and self.weight_decay >= 0):
-            raise InputError(
-                "training: factor must lie between 0 and 1, smallest_rate at most at learning_rate, weight_decay at 0 or above"
-            )
-        if not all(0 < width <= 500 for width in self.hidden):
-            raise InputError(f"training: hidden layers have 1 to 500 units, got {list(self.hidden)}")
+    train: Pairs
+    validation: Pairs
+    loss: Loss = mean_squares
+    from_zero: bool = False
 
 
 @dataclass
 class History:
-    """What happened, one entry per epoch: mean squared errors of the scaled outputs, learning rate; best epoch (from 1)."""
+    """What happened, one entry per epoch: losses, learning rate; best epoch (from 1; 0 where none beat the start)."""
 
     train: list[float] = field(default_factory=list)
     validation: list[float] = field(default_factory=list)
@@ -82,6 +57,7 @@ class History:
     seconds: float = 0.0
     best_epoch: int = 0
     best: float = float("inf")
+    start: float = float("nan")  # loss before the first epoch, of a network that begins at zero
     stopped: bool = False
     device: str = "cpu"
 
@@ -93,7 +69,7 @@ class _ISRU(torch.nn.Module):
         return x * torch.rsqrt(1 + x * x)
 
 
-def network(inputs: int, outputs: int, settings: MlpSettings) -> torch.nn.Sequential:
+def network(inputs: int, outputs: int, settings: NetworkSettings) -> torch.nn.Sequential:
     """Affine layers with the activation between them."""
     sizes = (inputs, *settings.hidden, outputs)
     parts: list[torch.nn.Module] = []
@@ -112,33 +88,47 @@ def layers_of(state: dict[str, torch.Tensor]) -> tuple[Array, ...]:
     return tuple(out)
 
 
-def train_mlp(
-    train: Pairs,
-    validation: Pairs,
-    settings: MlpSettings,
+def train(
+    problem: Problem,
+    settings: NetworkSettings,
     progress: Progress | None = None,
     checkpoint: Path | None = None,
 ) -> tuple[tuple[Array, ...], History]:
-    """Fit a network to `train`, judged by `validation`; min-max scaling of `train` is folded into the layers that are returned.
+    """Layers (outputs, 1 + inputs) with the lowest validation loss, in the problem's units, and the history.
 
-    Returns layers (outputs, 1 + inputs) on plain values, those with the lowest validation loss, and the history. Ctrl-C
-    ends the training and keeps the best so far. `checkpoint`: a file to go on from, written every 20 s and at the end;
-    going on gives the same bits as never having stopped. `progress` gets epoch, epochs, train, validation, best, rate after
-    every epoch. On a CUDA device where there is one. Raises InputError for a checkpoint of other samples or settings.
+    Ctrl-C ends the training and keeps the best so far. `checkpoint`: a file to go on from, written every 20 s and at the end; going on
+    gives the same bits as never having stopped. `progress` gets epoch, epochs, train, validation, best, rate after every epoch. On a
+    CUDA device where there is one. Raises InputError for a checkpoint of other samples or settings.
     """
     if checkpoint is not None:
         make_folder(checkpoint.parent)
     with _reproducible(settings):
-        run = _Run(train, validation, settings)
+        run = _Run(problem, settings)
         if checkpoint is not None and checkpoint.exists():
             run.restore(checkpoint)
         _loop(run, settings, progress, checkpoint)
     if run.best_state is None:
         raise InputError("training ended before its first epoch; nothing was learned")
-    return fold(layers_of(run.best_state), run.scaling_in, run.scaling_out), run.history
+    return layers_of(run.best_state), run.history
 
 
-def _loop(run: _Run, settings: MlpSettings, progress: Progress | None, checkpoint: Path | None) -> None:
+def train_scaled(
+    train_pairs: Pairs,
+    validation: Pairs,
+    settings: NetworkSettings,
+    progress: Progress | None = None,
+    checkpoint: Path | None = None,
+) -> tuple[tuple[Array, ...], History]:
+    """As `train`, with the mean squares of values that are scaled to [-1, 1] on the training set; the scaling is folded into the layers."""
+    inputs, outputs = Scaling.fitted(train_pairs.inputs), Scaling.fitted(train_pairs.targets)
+    scaled, judged = (
+        Pairs(inputs.scale(p.inputs), outputs.scale(p.targets)) for p in (train_pairs, validation)
+    )
+    layers, history = train(Problem(scaled, judged), settings, progress, checkpoint)
+    return fold(layers, inputs, outputs), history
+
+
+def _loop(run: _Run, settings: NetworkSettings, progress: Progress | None, checkpoint: Path | None) -> None:
     saved = time.monotonic()
     whole = run.snapshot()
     try:
@@ -169,27 +159,29 @@ def _device() -> torch.device:
 class _Run:
     """A training under way: all that a checkpoint holds, and the scaled samples."""
 
-    def __init__(self, train: Pairs, validation: Pairs, settings: MlpSettings) -> None:
-        self.settings = settings
+    def __init__(self, problem: Problem, settings: NetworkSettings) -> None:
+        self.settings, self.loss = settings, problem.loss
         self.device = _device()
         kind = torch.float32 if settings.precision == "float32" else torch.float64
-        self.scaling_in, self.scaling_out = Scaling.fitted(train.inputs), Scaling.fitted(train.targets)
         self.samples, self.judged = (
-            tuple(
-                torch.as_tensor(s.scale(v), dtype=kind, device=self.device)
-                for s, v in ((self.scaling_in, p.inputs), (self.scaling_out, p.targets))
-            )
-            for p in (train, validation)
+            tuple(torch.as_tensor(v, dtype=kind, device=self.device) for v in (p.inputs, p.targets))
+            for p in (problem.train, problem.validation)
         )
-        self.model = network(train.inputs.shape[1], train.targets.shape[1], settings).to(self.device, kind)
+        inputs, outputs = problem.train.inputs.shape[1], problem.train.targets.shape[1]
+        self.model = network(inputs, outputs, settings).to(self.device, kind)
+        self.history = History(device=str(self.device))
+        self.best_state: dict[str, torch.Tensor] | None = None
+        if problem.from_zero:
+            for parameter in self.model[-1].parameters():
+                torch.nn.init.zeros_(parameter)
+            self.history.start = self._judge()
+            self._keep_if_best(self.history.start)
         self.optimizer = torch.optim.AdamW(
             self.model.parameters(), settings.learning_rate, weight_decay=settings.weight_decay, fused=True
         )
         self.scheduler = _scheduler(self.optimizer, settings)
         self.order = torch.Generator().manual_seed(settings.seed)
-        self.history = History(device=str(self.device))
-        self.best_state: dict[str, torch.Tensor] | None = None
-        self.fingerprint = fingerprint(train, validation, settings)
+        self.fingerprint = fingerprint(problem.train, problem.validation, settings)
 
     @property
     def rate(self) -> float:
@@ -210,24 +202,30 @@ class _Run:
         )
         for x, y in batches:
             self.optimizer.zero_grad()
-            loss = torch.nn.functional.mse_loss(self.model(x), y)
+            loss = self.loss(self.model(x), y)
             loss.backward()
             self.optimizer.step()
             total += loss.detach() * len(x)
-        with torch.no_grad():
-            judged = float(torch.nn.functional.mse_loss(self.model(self.judged[0]), self.judged[1]))
-        history = self.history
+        judged, history = self._judge(), self.history
         history.train.append(float(total) / len(inputs))
         history.validation.append(judged)
         history.rate.append(rate)
-        if judged < history.best:
-            history.best, history.best_epoch = judged, len(history.train)
-            self.best_state = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
+        self._keep_if_best(judged)
         if self.settings.scheduler == "plateau":
             self.scheduler.step(judged)
         else:
             self.scheduler.step()
         history.seconds += time.monotonic() - begin
+
+    def _judge(self) -> float:
+        """Loss of the validation samples."""
+        with torch.no_grad():
+            return float(self.loss(self.model(self.judged[0]), self.judged[1]))
+
+    def _keep_if_best(self, judged: float) -> None:
+        if judged < self.history.best:
+            self.history.best, self.history.best_epoch = judged, len(self.history.train)
+            self.best_state = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
 
     def report(self) -> dict[str, float]:
         h = self.history
@@ -269,7 +267,7 @@ class _Run:
         self.history.stopped, self.history.device = False, str(self.device)
 
 
-def _scheduler(optimizer: torch.optim.Optimizer, settings: MlpSettings) -> Any:
+def _scheduler(optimizer: torch.optim.Optimizer, settings: NetworkSettings) -> Any:
     s = settings
     if s.scheduler == "plateau":
         return torch.optim.lr_scheduler.ReduceLROnPlateau(
@@ -282,10 +280,10 @@ def _scheduler(optimizer: torch.optim.Optimizer, settings: MlpSettings) -> Any:
     )
 
 
-def fingerprint(train: Pairs, validation: Pairs, settings: MlpSettings) -> str:
+def fingerprint(train: Pairs, validation: Pairs, settings: NetworkSettings) -> str:
     """Hash of the samples and of every setting that a resumed training may not change."""
     free = {"threads"} | ({"epochs"} if settings.scheduler == "plateau" else set())
-    digest = hashlib.sha256(json.dumps({k: v for k, v in asdict(settings).items() if k not in free}).encode())
+    digest = hashlib.sha256(json.dumps(settings.model_dump(exclude=free)).encode())
     for values in (train.inputs, train.targets, validation.inputs, validation.targets):
         digest.update(np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()
@@ -308,7 +306,7 @@ def _write(state: dict[str, Any], path: Path) -> None:
 
 
 @contextmanager
-def _reproducible(settings: MlpSettings) -> Iterator[None]:
+def _reproducible(settings: NetworkSettings) -> Iterator[None]:
     """The seed's random numbers, deterministic kernels and the stated threads inside; the caller's own outside."""
     threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     with torch.random.fork_rng():

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from fatigue_runner.corrector.training_data import Pairs
+from fatigue_runner.corrector.network.pairs import Pairs
+from fatigue_runner.corrector.network.settings import SCHEDULERS, NetworkSettings
 from fatigue_runner.errors import InputError
-
-if TYPE_CHECKING:
-    from fatigue_runner.corrector.training import MlpSettings
 
 BATCHES = (64, 128, 256, 512, 1024)
 RATES = (3e-4, 1e-2)
@@ -32,7 +30,7 @@ class TrialReport:
 class Tuned:
     """The base settings with the best trial's batch, rates and scheduler in them; all trials of the study; stopped by Ctrl-C?"""
 
-    settings: MlpSettings
+    settings: NetworkSettings
     trials: tuple[TrialReport, ...]
     stopped: bool
 
@@ -40,7 +38,7 @@ class Tuned:
 def tune(
     train: Pairs,
     validation: Pairs,
-    base: MlpSettings,
+    base: NetworkSettings,
     trials: int,
     epochs: int,
     storage: Path,
@@ -52,7 +50,7 @@ def tune(
     belongs to its samples and base settings: the same file serves several. Called again it goes on where it stopped; Ctrl-C
     keeps what is finished. Raises InputError without Optuna, for a file that is no study, and where no trial has finished.
     """
-    from fatigue_runner.corrector.training import make_folder
+    from fatigue_runner.corrector.network.training import make_folder
 
     try:
         import optuna
@@ -61,24 +59,24 @@ def tune(
     if trials < 1 or epochs < 1:
         raise InputError(f"tuning needs at least one trial of one epoch, got {trials} of {epochs}")
     make_folder(storage.parent)
-    study = _study(optuna, train, validation, replace(base, epochs=epochs), storage)
+    study = _study(optuna, train, validation, base.but(epochs=epochs), storage)
     stopped = False
     while not stopped and _finished(study) < trials:
         trial = study.ask()
-        stopped = _one(optuna, study, trial, train, validation, replace(base, epochs=epochs))
+        stopped = _one(optuna, study, trial, train, validation, base.but(epochs=epochs))
         if progress is not None:
             progress(_report(study.trials[trial.number]))
     done = [t for t in study.trials if t.state.name == "COMPLETE"]
     if not done:
         raise InputError(f"no trial of {storage} has finished; run the tuning again to go on")
-    settings = replace(base, **study.best_trial.user_attrs["settings"])
+    settings = base.but(**study.best_trial.user_attrs["settings"])
     return Tuned(settings, tuple(_report(t) for t in study.trials), stopped)
 
 
-def _study(optuna: Any, train: Pairs, validation: Pairs, settings: MlpSettings, storage: Path) -> Any:
+def _study(optuna: Any, train: Pairs, validation: Pairs, settings: NetworkSettings, storage: Path) -> Any:
     from sqlalchemy.exc import SQLAlchemyError
 
-    from fatigue_runner.corrector.training import fingerprint
+    from fatigue_runner.corrector.network.training import fingerprint
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
@@ -104,8 +102,6 @@ def _finished(study: Any) -> int:
 
 def _suggest(trial: Any, epochs: int, smallest_rate: float) -> dict[str, Any]:
     """The settings that a trial tries."""
-    from fatigue_runner.corrector.training import SCHEDULERS
-
     rate = trial.suggest_float("learning_rate", *RATES, log=True)
     found = {
         "batch": trial.suggest_categorical("batch", BATCHES),
@@ -123,9 +119,9 @@ class _Pruned(Exception):
     """Leaves the training of a trial that is not worth going on with."""
 
 
-def _one(optuna: Any, study: Any, trial: Any, train: Pairs, validation: Pairs, base: MlpSettings) -> bool:
+def _one(optuna: Any, study: Any, trial: Any, train: Pairs, validation: Pairs, base: NetworkSettings) -> bool:
     """Run one trial; True where Ctrl-C ended it."""
-    from fatigue_runner.corrector.training import train_mlp
+    from fatigue_runner.corrector.network.training import train_scaled
 
     chosen = _suggest(trial, base.epochs, base.smallest_rate)
     trial.set_user_attr("settings", chosen)
@@ -137,7 +133,7 @@ def _one(optuna: Any, study: Any, trial: Any, train: Pairs, validation: Pairs, b
 
     states = optuna.trial.TrialState
     try:
-        _, history = train_mlp(train, validation, replace(base, **chosen), watch)
+        _, history = train_scaled(train, validation, base.but(**chosen), watch)
     except _Pruned:
         study.tell(trial, state=states.PRUNED)
         return False

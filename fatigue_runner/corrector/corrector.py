@@ -1,0 +1,100 @@
+"""A trained corrector: what it is bound to, its map, its guard, and what is known of its making."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fatigue_runner.corrector.binding import Binding
+from fatigue_runner.corrector.errors import CorrectorError
+from fatigue_runner.corrector.guard import Guard
+from fatigue_runner.corrector.maps import Map
+
+if TYPE_CHECKING:
+    from fatigue_runner.turbine import Turbine
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Corrector:
+    """N(x, p) of x+ = eta_h(x) + h^(p+1) N, for one turbine, method and step [s]: a `integrators.protocol.StepCorrector`.
+
+    Of its making: wind_range [m/s] of the training, figures on winds that were not trained on (`validation`), facts of the training,
+    the text of the recipe. Raises CorrectorError where binding, map and guard do not fit together.
+    """
+
+    name: str
+    family: str
+    binding: Binding
+    map: Map
+    guard: Guard
+    wind_range: tuple[float, float] = (0.0, 0.0)
+    validation: Mapping[str, float] = field(default_factory=dict)
+    training: Mapping[str, Any] = field(default_factory=dict)
+    recipe: str = ""
+    licence: str = "Apache-2.0"
+
+    def __post_init__(self) -> None:
+        method = self.binding.found
+        if method.family != self.map.methods:
+            raise CorrectorError(
+                f"corrector {self.name}: features {self.map.kind!r} do not exist for {method.name}"
+            )
+        try:
+            self.map.check(method, self.guard)
+        except CorrectorError as error:
+            raise CorrectorError(f"corrector {self.name}: {error}") from None
+        if not all(np.isfinite(weights).all() for weights in self.map.tensors().values()):
+            raise CorrectorError(f"corrector {self.name}: a weight is not a finite number; train it anew")
+
+    def __repr__(self) -> str:
+        return f"Corrector({self.name!r}, {self.family}, {self.turbine}, {self.method} at {self.step * 1e3:g} ms)"
+
+    @property
+    def turbine(self) -> str:
+        """Its name."""
+        return self.binding.turbine
+
+    @property
+    def turbine_hash(self) -> str:
+        return self.binding.turbine_hash
+
+    @property
+    def method(self) -> str:
+        return self.binding.method
+
+    @property
+    def step(self) -> float:
+        """[s]"""
+        return self.binding.step
+
+    @property
+    def history(self) -> int:
+        return self.map.history
+
+    @property
+    def past(self) -> int:
+        return self.map.past
+
+    @property
+    def damping(self) -> float:
+        return self.map.damping
+
+    def bind(self, turbine: Turbine, method: str, step: float) -> None:
+        """Raises CorrectorError unless it was trained for this turbine, method and step [s]."""
+        refusal = self.binding.refusal(turbine, method, step)
+        if refusal:
+            raise CorrectorError(f"corrector {self.name} {refusal}")
+
+    def map_data(self, turbine: Turbine, pitch: float = 0.0) -> NamedTuple:
+        """What the compiled loop reads of the map."""
+        return self.map.data(self.binding, turbine, pitch)
+
+    def predict(self, sampled: Any) -> Array:
+        """Defects (n, states) [state units] of sampled steps, as the kernel computes them."""
+        return self.map.predict(sampled, self.binding.size)

@@ -1,0 +1,124 @@
+"""What every map is: the base class and the register of kinds."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fatigue_runner.corrector.errors import CorrectorError
+from fatigue_runner.errors import did_you_mean
+
+if TYPE_CHECKING:
+    from fatigue_runner.corrector.binding import Binding
+    from fatigue_runner.corrector.guard import Guard
+    from fatigue_runner.integrators.methods import Method
+    from fatigue_runner.trajectory import Trajectory
+    from fatigue_runner.turbine import Turbine
+
+Array = NDArray[np.float64]
+
+# kind -> its class; filled as the modules of this folder, and families with maps of their own, are imported
+MAPS: dict[str, type[Map]] = {}
+
+
+class Sampled(Protocol):
+    """n sampled steps as a kind of map sees them: beside what is its own, the plain results (n, states) and what they lack."""
+
+    plain: Array
+
+    @property
+    def defect(self) -> Array: ...
+
+
+class Map(ABC):
+    """N of x+ = eta_h(x) + h^(p+1) N for one family of methods.
+
+    A subclass is a frozen dataclass of arrays and names. It sets `kind`, the name in artefacts, and `methods`, the family of the methods
+    that it is for (`Method.family`), and gives the abstract members below. `check` refuses what does not fit together; its sentences
+    begin behind "corrector NAME: ". The compiled loop and `predict` must give the same defects: a test compares them step by step.
+    """
+
+    kind: ClassVar[str]
+    methods: ClassVar[str]
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "kind" in cls.__dict__:
+            MAPS[cls.kind] = cls
+
+    # --- what the integrators ask, see integrators/protocol.py ---
+
+    @property
+    def history(self) -> int:
+        return 0
+
+    @property
+    def past(self) -> int:
+        return 0
+
+    @property
+    def damping(self) -> float:
+        return 0.0
+
+    @abstractmethod
+    def data(self, binding: Binding, turbine: Turbine, pitch: float) -> NamedTuple:
+        """The arrays that the compiled loop reads, scaled to the defect; pitch [rad]."""
+
+    # --- its consistency ---
+
+    @abstractmethod
+    def check(self, method: Method, guard: Guard) -> None:
+        """Raises CorrectorError where shapes, names or the guard do not fit the map and the method."""
+
+    # --- its samples ---
+
+    @abstractmethod
+    def sample(
+        self,
+        binding: Binding,
+        turbine: Turbine,
+        winds: Sequence[Any],
+        runs: Sequence[Trajectory],
+        per_wind: int,
+        seed: int,
+    ) -> Sampled:
+        """Steps from random places of accurate trajectories `runs` under `winds`; see `samples.output_step` for their sampling."""
+
+    @abstractmethod
+    def predict(self, sampled: Any, size: float) -> Array:
+        """(n, states) defects of sampled steps, as the compiled loop computes them; size: h^(p+1)."""
+
+    def reference_step(self, step: float) -> float:
+        """Sampling [s] of the trajectories that `sample` needs for steps of `step` [s]."""
+        return step
+
+    # --- its file ---
+
+    @abstractmethod
+    def tensors(self) -> dict[str, Array]:
+        """Arrays by their names in the artefact."""
+
+    @abstractmethod
+    def header(self) -> dict[str, Any]:
+        """What the artefact's header says beside them: plain values."""
+
+    @classmethod
+    @abstractmethod
+    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array]) -> Self:
+        """The map of a file. Raises KeyError for what is missing."""
+
+    @property
+    def sees(self) -> str:
+        """What it sees, in words."""
+        return self.kind
+
+
+def map_class(kind: str) -> type[Map]:
+    """The class of this kind. Raises CorrectorError with the nearest known one."""
+    if kind not in MAPS:
+        raise CorrectorError(f"features {kind!r} do not exist{did_you_mean(kind, MAPS)}")
+    return MAPS[kind]
