@@ -63,7 +63,7 @@ def _prune(base: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def njit(**options: Any) -> Callable[[Callable], Callable]:
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """`numba.njit(cache=True, **options)` with the keyed cache; without a writable one it warns and compiles every time.
 
     Strict arithmetic unless `options` say otherwise: left open, numba would compile a function with the flags of its caller, and a
@@ -71,7 +71,7 @@ def njit(**options: Any) -> Callable[[Callable], Callable]:
     """
     options = {"fastmath": False, **options}
 
-    def decorate(function: Callable) -> Callable:
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
         before = config.CACHE_DIR
         config.CACHE_DIR = str(cache_folder())
         try:

@@ -54,13 +54,13 @@ def block_function() -> Callable[..., list[Any]]:
             getattr(integrators, n) for n in ("Ensemble", "Integrator", "simulate")
         )
 
-        def new(turbine, winds, initial, duration, pitch, method, step, corrector, mode):
+        def new(turbine, winds, initial, duration, pitch, method, step, corrector, mode):  # type: ignore[no-untyped-def]
             cases = ensemble(turbine, winds, initial, duration, output_step=0.02, pitch=pitch)
             return simulate(cases, integrator(method, step, corrector=corrector, mode=mode))
 
         return new
 
-    def old(turbine, winds, initial, duration, pitch, method, step, corrector, mode):
+    def old(turbine, winds, initial, duration, pitch, method, step, corrector, mode):  # type: ignore[no-untyped-def]
         options = {"pitch": pitch, "corrector": corrector, "mode": mode}
         return integrators.simulate_block(turbine, method, step, winds, initial, duration, 0.02, **options)
 
@@ -144,7 +144,7 @@ def ask(worker: subprocess.Popen[str], entry: str) -> float:
 
 
 def in_turns(
-    old: Any, new: Any, entries: list[str], rounds: int, ask: Callable = ask
+    old: Any, new: Any, entries: list[str], rounds: int, ask: Callable[[Any, str], float] = ask
 ) -> dict[str, list[tuple[float, float]]]:
     """{entry: (old, new) times of every round}; who is first changes from round to round."""
     found: dict[str, list[tuple[float, float]]] = {entry: [] for entry in entries}

@@ -24,7 +24,7 @@ TARGET = ROOT / "fatigue_runner" / "turbine" / "generated" / "kernel.py"
 LANES = 16
 
 
-class Printer(PythonCodePrinter):
+class Printer(PythonCodePrinter):  # type: ignore[misc]  # sympy has no hints
     """Source that `lane_code` reads: products instead of powers, sums that become fused multiply-adds."""
 
     def _print_Pow(self, expr, rational=False):

@@ -87,7 +87,7 @@ def start(tree: Path, script: Path, arguments: Sequence[str], **options: object)
         # the package drops the oldest of its kernels' folders: here the ones of the revision stay, whatever else is compiled
         environment.setdefault("NUMBA_CACHE_DIR", str(_cache() / "revisions" / "kernels"))
     command = [sys.executable, str(script), *arguments]
-    return subprocess.Popen(command, env=environment, text=True, stdout=subprocess.PIPE, **options)  # type: ignore[call-overload,no-any-return]
+    return subprocess.Popen(command, env=environment, text=True, stdout=subprocess.PIPE, **options)  # type: ignore[call-overload]
 
 
 def check_import(tree: str) -> None:

@@ -10,9 +10,11 @@ import numpy as np
 
 from fatigue_runner.compiled import njit
 
+Array = np.ndarray
+
 
 @njit(nogil=True)
-def reversals(series, points):
+def reversals(series: Array, points: Array) -> int:
     """Write reversals and ends of `series` (n >= 3) to `points` (n,); return how many, 0 for a constant.
 
     The product's sign, not a comparison of signs, is what the reference package tests: where it underflows
@@ -33,7 +35,7 @@ def reversals(series, points):
 
 
 @njit(nogil=True)
-def three_point(points, residue_count, ranges, means, counts):
+def three_point(points: Array, residue_count: float, ranges: Array, means: Array, counts: Array) -> int:
     """ASTM E1049-85, 5.4.4 on the reversals `points`, which it overwrites; return the number of cycles.
 
     Every range that never closes is written with `residue_count`, or left out when that is 0.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import zlib
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 from mcap.opcode import Opcode
 
@@ -39,7 +39,7 @@ def _summary_bytes(stream: IO[bytes], size: int) -> tuple[bytes, int]:
 def parse_summary(data: bytes, start: int) -> Index:
     """The index that a summary section declares; start: where it begins in the file."""
     index = Index()
-    groups: dict[int, list] = {
+    groups: dict[int, list[Any]] = {
         Opcode.SCHEMA: index.schemas,
         Opcode.CHANNEL: index.channels,
         Opcode.CHUNK_INDEX: index.chunks,

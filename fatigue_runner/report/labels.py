@@ -61,7 +61,7 @@ def draw_labels(axes: Axes, labels: Sequence[Label]) -> None:
             label.point,
             xytext=(dx, dy),
             textcoords="offset points",
-            ha=align,  # type: ignore[arg-type]
+            ha=align,
             fontsize=SIZE,
             fontweight="bold" if label.bold else "normal",
             color=label.colour,

@@ -88,8 +88,8 @@ def peak() -> Callable[[], float]:
     width, chains = machine.describe()["vector_bits"] // 64, 12
 
     @intrinsic
-    def multiply_adds(typing_context, rounds, start):
-        def codegen(context, builder, signature, args):
+    def multiply_adds(typing_context: Any, rounds: Any, start: Any) -> Any:
+        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             vector = ir.VectorType(ir.DoubleType(), width)
             splat = builder.insert_element(ir.Constant(vector, ir.Undefined), args[1], ir.IntType(32)(0))
             zero = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
@@ -107,7 +107,7 @@ def peak() -> Callable[[], float]:
         return types.float64(types.int64, types.float64), codegen
 
     @numba.njit(nogil=True)
-    def run(rounds, start):
+    def run(rounds: int, start: float) -> float:
         return multiply_adds(rounds, start)  # type: ignore[call-arg]
 
     run(1, 0.5)

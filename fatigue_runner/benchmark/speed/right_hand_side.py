@@ -56,7 +56,18 @@ def _repeated(rhs: Callable[..., None]) -> Callable[..., None]:
     import numba
 
     @numba.njit(nogil=True)
-    def run(repeats, x, wind, out, tables, cells, constants, scratch, row, clamped):
+    def run(
+        repeats: int,
+        x: Array,
+        wind: Array,
+        out: Array,
+        tables: Any,
+        cells: Any,
+        constants: Array,
+        scratch: Array,
+        row: Array,
+        clamped: Array,
+    ) -> None:
         for _ in range(repeats):
             rhs(x, wind, out, 0, tables, cells, constants, scratch, row, clamped)
 
@@ -81,7 +92,7 @@ def arguments(
 
 
 @njit(nogil=True)
-def _slope(t, x, wind, work, data):
+def _slope(t: float, x: Array, wind: Any, work: Any, data: Any) -> Array:
     """f(t, x) (16,) of one case: the same state in every lane, the first one read."""
     cell_duration, block = wind
     state, p, slope, clamped = work

@@ -52,7 +52,7 @@ def solver(name: str) -> Any:
     a, b, e, c = TSIT5.arrays()
     n = TSIT5.evaluations_per_step
 
-    class Tsit5(RK45):
+    class Tsit5(RK45):  # type: ignore[misc]  # SciPy has no hints
         A, B, C, E, n_stages = a[:n, :n], b[:n], c[:n], -e, n
 
     return Tsit5

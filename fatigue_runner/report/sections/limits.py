@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from fatigue_runner.report.blocks import Section, Warnings
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.results.cells import Row, format_percent, number, text
@@ -24,7 +26,7 @@ def lost_share(rows: list[Row]) -> float:
     return sum(text(row, "status") != "done" for row in rows) / len(rows) if rows else 0.0
 
 
-def rows_of(run: Run, key: tuple) -> list[Row]:
+def rows_of(run: Run, key: tuple[Any, ...]) -> list[Row]:
     """All rows of one integrator."""
     from fatigue_runner.results.ranking import integrator_key
 

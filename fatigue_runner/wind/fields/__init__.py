@@ -11,7 +11,8 @@ NetCDF for reading floats; none checks what it reads.
 """
 
 from fatigue_runner.wind.fields.field import WindField
-from fatigue_runner.wind.fields.formats import MannBox, read_wind
+from fatigue_runner.wind.fields.formats import read_wind
+from fatigue_runner.wind.fields.hawc import MannBox
 from fatigue_runner.wind.fields.projection import FieldHarmonics, harmonics_of
 from fatigue_runner.wind.fields.uniform import UniformWind, harmonics_of_uniform
 

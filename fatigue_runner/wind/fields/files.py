@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Any
 
 from fatigue_runner.errors import InputError
 
@@ -41,7 +42,7 @@ class Header:
     def __init__(self, path: Path, data: bytes) -> None:
         self.path, self.data, self.position = path, data, 0
 
-    def take(self, form: str) -> tuple:
+    def take(self, form: str) -> tuple[Any, ...]:
         """The next numbers, `form` as in `struct` (h: 2-byte integer, i: 4-byte integer, f: 4-byte float)."""
         form = f"<{form}"
         try:
