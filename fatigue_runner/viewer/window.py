@@ -12,10 +12,13 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from time import monotonic, sleep
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from fatigue_runner.errors import InputError
+
+if TYPE_CHECKING:
+    from fatigue_runner.viewer.cases import Viewed
 
 HOST = "127.0.0.1"
 WEB_PORT = 9090
@@ -67,8 +70,8 @@ def view(
                 wait(process)
 
 
-def write_recording(path: Path, cases: Sequence[Any], scale: float = 1.0, playing: bool = True) -> None:
-    """Write cases (`cases.Viewed`) with their first screen as an .rrd. Raises InputError where it cannot be written."""
+def write_recording(path: Path, cases: Sequence[Viewed], scale: float = 1.0, playing: bool = True) -> None:
+    """Write cases with their first screen as an .rrd. Raises InputError where it cannot be written."""
     import rerun as rr
 
     from fatigue_runner.viewer.blueprint import first_screen
