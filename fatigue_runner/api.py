@@ -75,7 +75,7 @@ def simulate(
 
 
 def correctors() -> list[Any]:
-    """The shipped correctors: .name, .turbine, .turbine_hash, .method, .step [s], .validation, ..."""
+    """The shipped correctors, which print as a table: .name, .turbine, .turbine_hash, .method, .step [s], .validation, ..."""
     from fatigue_runner.corrector import correctors as shipped
 
     return shipped()

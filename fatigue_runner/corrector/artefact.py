@@ -16,7 +16,7 @@ from fatigue_runner.corrector.binding import Binding
 from fatigue_runner.corrector.corrector import Corrector
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.guard import Guard
-from fatigue_runner.corrector.maps import map_class
+from fatigue_runner.corrector.maps import MAPS, map_class
 
 FORMAT = "fatigue-runner corrector 1"
 _FACTS = ("wind_range", "validation", "training", "recipe", "licence")
@@ -83,6 +83,8 @@ def load(path: Path | str) -> Corrector:
 
 
 def _corrector(header: dict[str, Any], tensors: dict[str, Any]) -> Corrector:
+    if header["kind"] not in MAPS:
+        from fatigue_runner.corrector import families  # noqa: F401 - a family may bring a map of its own
     guard: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()}
     try:
         kind = map_class(header["kind"])

@@ -28,7 +28,7 @@ def summary(corrector: Corrector) -> list[tuple[str, str]]:
     )
     if corrector.past:
         fallback = f"{corrector.method} as it is"
-    sizes = [f"{a} x {b}" for a, b in (weights.shape for weights in corrector.map.tensors().values())]
+    sizes = [" x ".join(map(str, weights.shape)) for weights in corrector.map.tensors().values()]
     return [
         ("family", corrector.family),
         ("turbine", f"{corrector.turbine} ({corrector.turbine_hash[:12]})"),

@@ -24,30 +24,23 @@ def list_correctors(folder: Folder = None) -> None:
 
         fatigue-runner correctors list
     """
+    from rich.markup import escape
     from rich.table import Table
 
     from fatigue_runner.corrector import library
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for column in ("name", "family", "turbine", "method", "step [ms]", "plain", "enhanced", "hybrid"):
-        table.add_column(
-            column, justify="right" if column in ("step [ms]", "plain", "enhanced", "hybrid") else "left"
-        )
     found = library.correctors([folder] if folder else [])
-    for c in found:
-        errors = [
-            f"{c.validation[key]:.1e}" if key in c.validation else "-"
-            for key in ("nrmse_plain", "nrmse_enhanced", "nrmse_hybrid")
-        ]
-        table.add_row(c.name, c.family, c.turbine, c.method, f"{c.step * 1e3:g}", *errors)
     if not found:
         typer.echo("no correctors found; train one with `fatigue-runner train RECIPE`")
         return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for column in found.COLUMNS:
+        table.add_column(escape(column), justify="right" if column in found.FIGURES else "left")
+    for row in found.rows():
+        table.add_row(*row)
     to = console()
     to.print(table)
-    to.print(
-        "plain, enhanced, hybrid: median NRMSE over winds that were not trained on; - : diverged or not measured"
-    )
+    to.print(found.NOTE)
 
 
 @app.command()

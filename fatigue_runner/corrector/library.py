@@ -23,9 +23,39 @@ def files(more: Sequence[Path] = ()) -> dict[str, Path]:
     return found
 
 
-def correctors(more: Sequence[Path] = ()) -> list[Corrector]:
+class Correctors(list[Corrector]):
+    """A list that reads as a table: what each is for, and its median error under winds that it was not trained on."""
+
+    COLUMNS = ("name", "family", "turbine", "method", "step [ms]", "plain", "enhanced", "hybrid")
+    FIGURES = COLUMNS[4:]
+    NOTE = "plain, enhanced, hybrid: median NRMSE over winds that were not trained on; - : diverged or not measured"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Texts of `COLUMNS`, one row per corrector."""
+        return [
+            (c.name, c.family, c.turbine, c.method, f"{c.step * 1e3:g}", *(_error(c, mode) for mode in self.FIGURES[1:]))
+            for c in self
+        ]  # fmt: skip
+
+    def __repr__(self) -> str:
+        rows = [self.COLUMNS, *self.rows()]
+        widths = [max(len(row[i]) for row in rows) for i in range(len(self.COLUMNS))]
+
+        def cell(column: str, text: str, width: int) -> str:
+            return text.rjust(width) if column in self.FIGURES else text.ljust(width)
+
+        lines = ("  ".join(map(cell, self.COLUMNS, row, widths)).rstrip() for row in rows)
+        return "\n".join((*lines, self.NOTE))
+
+
+def _error(corrector: Corrector, mode: str) -> str:
+    value = corrector.validation.get(f"nrmse_{mode}")
+    return "-" if value is None else f"{value:.1e}"
+
+
+def correctors(more: Sequence[Path] = ()) -> Correctors:
     """All correctors that can be read, by name; a damaged file is left out (`find` says what is wrong with it)."""
-    out = []
+    out = Correctors()
     for path in dict(sorted(files(more).items())).values():
         try:
             out.append(load(path))

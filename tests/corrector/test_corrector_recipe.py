@@ -119,7 +119,7 @@ def test_the_command_line_lists_and_shows_correctors(made):
     run = CliRunner().invoke
     listed = run(app, ["correctors", "list", "--folder", str(made.path.parent)])
     assert listed.exit_code == 0
-    assert "quick" in listed.output
+    assert "quick" in listed.output and "step [ms]" in listed.output
     shown = run(app, ["correctors", "show", "quick", "--folder", str(made.path.parent)])
     assert "# quick" in shown.output
     assert "family: affine" in shown.output
