@@ -31,7 +31,7 @@ FLOOR = {
 # Which rooms a room may import. A new room is one line here.
 MAY_IMPORT = {
     "inputs": set(),
-    "turbine": set(),
+    "turbine": {"inputs"},
     "wind": {"inputs"},
     "fatigue": set(),
     "logbook": set(),

@@ -14,7 +14,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from fatigue_runner.turbine.parameters import read_turbine_file
+from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.table_builder import (
     PITCH_DEG,
     TIP_SPEED_RATIO,

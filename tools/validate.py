@@ -20,8 +20,8 @@ from fatigue_runner.integrators import Ensemble, Integrator, simulate
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.aerodynamics import power_coefficient, thrust_coefficient
 from fatigue_runner.turbine.beam import blade_modes, tower_modes
+from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.finite_elements import blade_beam, clamped_frequencies
-from fatigue_runner.turbine.parameters import read_turbine_file
 from fatigue_runner.turbine.table_builder import turbine_blade
 from fatigue_runner.wind import ConstantWind
 

@@ -55,7 +55,7 @@ def resolved_yaml(resolved: Resolved) -> str:
 
 def turbine_yaml(resolved: Resolved) -> str:
     """The turbine's file with what it is based on; of its aerodynamic tables the name only, their content is in the hash."""
-    from fatigue_runner.turbine.parameters import read_turbine_file
+    from fatigue_runner.turbine.file import read_turbine_file
 
     data = read_turbine_file(resolved.turbine_source)
     aero = data.get("aerodynamics", {})

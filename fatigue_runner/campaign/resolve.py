@@ -78,7 +78,7 @@ def resolve(campaign: Campaign, source: Source) -> Resolved:
 def _turbine_source(campaign: Campaign, source: Source) -> str:
     """A shipped turbine's name, or a YAML's path relative to the campaign file."""
     name = campaign.turbine
-    return str(source.file(name)) if Path(name).suffix in {".yaml", ".yml"} or "/" in name else name
+    return str(source.file(name)) if Path(name).suffix or "/" in name or "\\" in name else name
 
 
 def _load_turbine(turbine: str, source: Source) -> Turbine:

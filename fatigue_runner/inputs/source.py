@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,6 +44,7 @@ class Source:
         self.text = text
         self.folder = folder or Path.cwd()
         self._lines: dict[tuple[str | int, ...], int] = {(): 1}
+        self._names: dict[tuple[str | int, ...], str] = {}  # of places in another file, see `over`
         self._values = 0
         self.data = self._plain(data, ())
 
@@ -52,20 +54,21 @@ class Source:
         Elements of `path` that are not in the file (defaults, a single value where a list may stand) are
         skipped.
         """
-        if not self.text:
-            return None
+        return self._lines[self._known(path)] if self.text else None
+
+    def where(self, path: tuple[str | int, ...] = ()) -> str:
+        """The place as a user reads it: `campaigns/sweep.yaml:14`."""
+        line = self.line(path)
+        return self.name if line is None else f"{self._names.get(self._known(path), self.name)}:{line}"
+
+    def _known(self, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
         known: tuple[str | int, ...] = ()
         for key in path:
             for spelling in (key, f"{key}s"):  # `steps` may stand for `step`
                 if (*known, spelling) in self._lines:
                     known = (*known, spelling)
                     break
-        return self._lines[known]
-
-    def where(self, path: tuple[str | int, ...] = ()) -> str:
-        """The place as a user reads it: `campaigns/sweep.yaml:14`."""
-        line = self.line(path)
-        return self.name if line is None else f"{self.name}:{line}"
+        return known
 
     def file(self, name: str) -> Path:
         """The file that a value names; relative paths start at the source's folder."""
@@ -89,6 +92,16 @@ class Source:
         out._lines.setdefault((), 1)
         return out
 
+    def over(self, base: Source) -> Source:
+        """The mapping laid over another source's, mappings key by key, all else replaced. Places stay those of the files."""
+        out = Source(self.name, _laid(self.data, base.data), self.text, self.folder, self.what)
+        out._lines = {**base._lines, **self._lines}
+        out._names = {place: base._names.get(place, base.name) for place in base._lines}
+        out._names = {
+            place: name for place, name in out._names.items() if place not in self._lines
+        } | self._names
+        return out
+
     def _plain(self, node: Any, path: tuple[str | int, ...]) -> Any:
         self._values += 1
         if self._values > MAX_VALUES or len(path) > MAX_DEPTH:
@@ -99,6 +112,10 @@ class Source:
             return {str(key): self._child(node, key, str(key), value, path) for key, value in node.items()}
         if isinstance(node, list | tuple):
             return [self._child(node, i, i, value, path) for i, value in enumerate(node)]
+        if isinstance(node, os.PathLike):
+            return os.fspath(node)
+        if hasattr(node, "tolist"):  # numbers and arrays of a mapping that was computed
+            return node.tolist()
         for plain in (bool, int, float, str):  # ruamel's scalars are subclasses that carry their formatting
             if isinstance(node, plain):
                 return plain(node)
@@ -111,15 +128,20 @@ class Source:
         return self._plain(value, (*path, name))
 
 
+def _laid(over: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in over.items():
+        both = isinstance(value, Mapping) and isinstance(base.get(key), Mapping)
+        merged[key] = _laid(value, base[key]) if both else value
+    return merged
+
+
 def read_mapping(path: Path, what: str, keys: str) -> Source:
     """Read a YAML file that holds a mapping: `what` it is and its first `keys` stand in the messages.
 
     YAML 1.2: `1e7` is a number, duplicate keys are refused. Raises InputError for a missing or unreadable file and for text that is
     not YAML, with its line.
     """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -128,6 +150,14 @@ def read_mapping(path: Path, what: str, keys: str) -> Source:
         raise InputError(f"{path} is a folder; give the {what}'s YAML file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as text: {error}") from None
+    return parse_mapping(text, path, what, keys)
+
+
+def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
+    """The mapping in a YAML text from `path`. Raises InputError as `read_mapping`."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
     try:
         data = YAML(typ="rt").load(text)
     except MarkedYAMLError as error:

@@ -12,7 +12,7 @@ from fatigue_runner.integrators.methods import METHODS
 from fatigue_runner.integrators.stability import stability_limit
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.beam import blade_modes, tower_modes
-from fatigue_runner.turbine.parameters import read_turbine_file
+from fatigue_runner.turbine.file import read_turbine_file
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -120,12 +120,13 @@ def blade_modes(parameters: Mapping[str, Any]) -> BladeModes:
     if not 0 <= hub < tip:
         raise InputError(f"geometry: hub_radius {hub} must be at least 0 and below tip_radius {tip}")
     length, blade = tip - hub, parameters["blade"]
-    stations = _stations(blade, "span_fraction", "blade")
+    stations = stations_of(blade, "span_fraction", "blade: stations")
     x = np.linspace(0.0, 1.0, _FINE_POINTS)
     z = x * length
     twist = np.radians(np.interp(x, stations["span_fraction"], stations["structural_twist_deg"]))
     curve = {
-        n: _mode(blade[f"{n}_mode"], f"blade: {n}_mode").deriv(2)(x) / length**2 for n in ("flap", "edge")
+        n: mode_shape(blade[f"{n}_mode"], f"blade: {n}_mode").deriv(2)(x) / length**2
+        for n in ("flap", "edge")
     }
     bent = {
         "flap": curve["flap"][:, None] * np.column_stack([np.cos(twist), -np.sin(twist)]),
@@ -219,7 +220,7 @@ def tower_modes(parameters: Mapping[str, Any]) -> TowerModes:
     length = float(geometry["tower_height"]) - float(geometry["tower_base_height"])
     if length <= 0:
         raise InputError("geometry: tower_height must be above tower_base_height")
-    stations = _stations(tower, "height_fraction", "tower")
+    stations = stations_of(tower, "height_fraction", "tower: stations")
     elements = np.ones(int(tower["mass_elements"]))
     lumped = _lumped(elements, length, stations, "height_fraction", tower["mass_factor"])
     modes = {name: _tower_mode(tower, name, length, stations, lumped) for name in ("fore_aft", "side_side")}
@@ -232,7 +233,7 @@ def _tower_mode(
 ) -> TowerMode:
     x = np.linspace(0.0, 1.0, _FINE_POINTS)
     nodes, masses = lumped
-    polynomial = _mode(tower[f"{name}_mode"], f"tower: {name}_mode")
+    polynomial = mode_shape(tower[f"{name}_mode"], f"tower: {name}_mode")
     stiffness = np.interp(x, stations["height_fraction"], stations[f"{name}_stiffness"])
     phi, slope = polynomial(nodes / length), polynomial.deriv()(x) / length
     shortening = _cumulative(slope[:, None] ** 2, x * length)[:, 0]
@@ -258,7 +259,7 @@ def _single_mode(
     coefficients: Any, length: float, lumped: tuple, stiffness: Array, ratio: float
 ) -> dict[str, float]:
     """Modal mass, stiffness, damping and frequency [Hz] of one mode alone, without centrifugal stiffening."""
-    polynomial = _mode(coefficients, "mode")
+    polynomial = mode_shape(coefficients, "mode")
     nodes, masses = lumped
     x = np.linspace(0.0, 1.0, len(stiffness))
     modal_mass = float(masses @ polynomial(nodes / length) ** 2)
@@ -273,7 +274,7 @@ def _single_mode(
     }
 
 
-def _mode(coefficients: Any, place: str) -> Polynomial:
+def mode_shape(coefficients: Any, place: str) -> Polynomial:
     """The mode shape over the span fraction from its coefficients of x^2, x^3, ...; 1 at the free end."""
     values = np.array(coefficients, dtype=float)
     if not abs(values.sum() - 1.0) <= 1e-3:
@@ -283,14 +284,15 @@ def _mode(coefficients: Any, place: str) -> Polynomial:
     return Polynomial([0.0, 0.0, *values])
 
 
-def _stations(member: Mapping[str, Any], fraction: str, place: str) -> dict[str, Any]:
+def stations_of(member: Mapping[str, Any], fraction: str, place: str) -> dict[str, Any]:
+    """The stations' columns of a blade or tower. Raises InputError where they do not run from end to end, or have no mass or stiffness."""
     stations = columns(member["stations"])
     x = stations[fraction]
     if not (x[0] == 0.0 and x[-1] == 1.0 and np.all(np.diff(x) > 0)):
-        raise InputError(f"{place}: stations: {fraction} must rise from 0 to 1")
+        raise InputError(f"{place}: {fraction} must rise from 0 to 1")
     for name, column in stations.items():
         if name.endswith(("density", "stiffness")) and not np.all(column > 0):
-            raise InputError(f"{place}: stations: {name} must be positive")
+            raise InputError(f"{place}: {name} must be positive")
     return stations
 
 

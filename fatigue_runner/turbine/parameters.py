@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import cos, isfinite, radians, sin
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,46 +28,6 @@ _INTEGRALS = {
 }  # fmt: skip
 
 _FAR = 1e9  # a torque that is never reached [N m]
-
-
-def read_turbine_file(name: str) -> dict[str, Any]:
-    """The mapping of a turbine file, its `base` merged in. `name`: a shipped turbine or a path to a YAML.
-
-    Raises InputError where there is no such turbine, or the file is not YAML.
-    """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    path = Path(name)
-    if not path.suffix:
-        path = DATA / f"{name}.yaml"
-        if not path.exists():
-            known = sorted(p.stem for p in DATA.glob("*.yaml") if not p.stem.endswith("airfoils"))
-            raise InputError(
-                f"there is no turbine {name!r}{did_you_mean(name, known)} (or give the path of a YAML file)"
-            )
-    if not path.is_file():
-        raise InputError(f"turbine file {path} does not exist; give a shipped name such as nrel5mw or a path")
-    try:
-        data = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-    except (YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is not a YAML file: {' '.join(str(error).split())}") from None
-    if not isinstance(data, dict):
-        raise InputError(f"{path}: expected a mapping with `name`, `blade`, `tower`, ...")
-    # where a file names other files, they lie beside it, also when another turbine in another folder builds on it
-    for key in ("tables", "airfoils"):
-        if isinstance(data.get("aerodynamics"), dict) and key in data["aerodynamics"]:
-            data["aerodynamics"][key] = str(path.parent / str(data["aerodynamics"][key]))
-    base = data.pop("base", None)
-    return _merge(read_turbine_file(base), data) if base else data
-
-
-def _merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    merged = dict(base)
-    for key, value in over.items():
-        both = isinstance(value, Mapping) and isinstance(base.get(key), Mapping)
-        merged[key] = _merge(base[key], value) if both else value
-    return merged
 
 
 def equation_parameters(data: Mapping[str, Any]) -> dict[str, float]:
@@ -102,8 +61,6 @@ def equation_parameters(data: Mapping[str, Any]) -> dict[str, float]:
         raise InputError(
             f"turbine {data.get('name', '?')}: the entry {missing} is missing; compare nrel5mw.yaml"
         ) from None
-    if hub.get("centre_of_mass", 0.0):
-        raise InputError("hub: centre_of_mass must be 0: the model has the hub's mass at the rotor apex")
     return checked({k: float(v) for k, v in values.items()})
 
 

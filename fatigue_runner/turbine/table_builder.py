@@ -19,8 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.section import validated
+from fatigue_runner.inputs.source import read_mapping
 from fatigue_runner.turbine.aerodynamics import LOAD_NAMES, BladeAerodynamics, blade_aerodynamics, rotor_loads
 from fatigue_runner.turbine.beam import blade_modes
+from fatigue_runner.turbine.file import AirfoilFile
 
 Array = NDArray[np.float64]
 
@@ -92,9 +95,9 @@ def turbine_inputs(parameters: Mapping[str, Any]) -> str:
 
 @lru_cache(maxsize=8)
 def _read_airfoils(path: str) -> Mapping[str, Any]:
-    from ruamel.yaml import YAML
-
-    return YAML(typ="safe").load(Path(path).read_text(encoding="utf-8"))
+    source = read_mapping(Path(path), "polar file", "columns, airfoils")
+    validated(AirfoilFile, source)
+    return dict(source.data)
 
 
 def _airfoils(parameters: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -139,9 +142,14 @@ def make_tables(name: str) -> Path:
 
     Raises InputError for a shipped turbine, whose tables belong to the program.
     """
-    from fatigue_runner.turbine.parameters import DATA, read_turbine_file
+    from fatigue_runner.turbine.file import read_turbine_file
+    from fatigue_runner.turbine.parameters import DATA
 
     parameters = read_turbine_file(name)
+    if "airfoils" not in parameters["aerodynamics"]:
+        raise InputError(
+            f"turbine {name}: tables are made from `aerodynamics: airfoils:`, which is not given"
+        )
     path = Path(str(parameters["aerodynamics"]["tables"]))
     if path.parent == DATA:
         raise InputError(

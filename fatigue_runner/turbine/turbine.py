@@ -14,12 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.rotor import Rotor
-from fatigue_runner.turbine.parameters import (
-    at_pitch,
-    checked,
-    equation_parameters,
-    read_turbine_file,
-)
+from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turbine_file
+from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
 
 Array = NDArray[np.float64]
@@ -192,7 +188,10 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     (tip_speed_ratio, pitch_deg, coefficients), with `interpolation: cubic | bilinear`.
     Raises InputError naming what is missing or wrong.
     """
-    data = dict(source) if isinstance(source, Mapping) else read_turbine_file(str(source))
+    if not isinstance(source, Mapping):
+        data = read_turbine_file(str(source))
+    else:
+        data = dict(source) if "parameters" in source else check_turbine(mapping_source(source))
     name = str(data.get("name", "unnamed"))
     if "parameters" in data:
         if "tables" not in data:
@@ -205,9 +204,7 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
             str(data.get("description", "")),
         )
     parameters = equation_parameters(data)
-    aero = data.get("aerodynamics", {})
-    if "tables" not in aero:
-        raise InputError(f"turbine {name}: aerodynamics needs `tables`, the npz of coefficients")
+    aero = data["aerodynamics"]
     path = Path(str(aero["tables"]))
     tables = read_tables(path, str(aero.get("interpolation", "cubic")))
     # a shipped turbine's tables are checked when the project is built; a user's may have been made before the blade changed

@@ -14,7 +14,7 @@ from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.logbook import Log, LogError, read_log, read_metadata
 from fatigue_runner.naming import integrator_label
 from fatigue_runner.results.columns import WIND
-from fatigue_runner.turbine.parameters import read_turbine_file
+from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.viewer import colours
 from fatigue_runner.viewer.scene import Geometry, geometry
 from fatigue_runner.viewer.shapes import BladeSkin, blade_skin

@@ -12,6 +12,7 @@ from campaign_world import CAMPAIGN, build_world, write_campaign
 from ruamel.yaml import YAML
 
 from fatigue_runner.campaign import CampaignInterrupted, run_campaign
+from fatigue_runner.campaign.plan import make_plan
 from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES
 from fatigue_runner.errors import InputError
 from fatigue_runner.fatigue import damage_equivalent_load, short_term_cycles
@@ -403,6 +404,13 @@ def test_what_the_turbine_cannot_do_is_refused_and_nothing_is_written(
     assert message in str(error.value)
     assert not out.exists()
     assert world.calls == []
+
+
+@pytest.mark.parametrize("name", ["mine.yaml", "mine.YAML", "mine.yml", "./mine"])
+def test_a_turbine_file_is_looked_for_beside_the_campaign(world, tmp_path, name):
+    plan = make_plan(write_campaign(tmp_path, turbine=name))
+    assert plan.resolved.turbine_source == str(tmp_path / name)
+    assert make_plan(write_campaign(tmp_path, turbine="mine")).resolved.turbine_source == "mine"
 
 
 def test_winds_from_files_run_and_are_named_after_them(world, tmp_path, out):

@@ -25,8 +25,9 @@ from fatigue_runner.turbine.aerodynamics import (
     thrust_coefficient,
 )
 from fatigue_runner.turbine.beam import blade_modes
+from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.generated.kernel import TABLES
-from fatigue_runner.turbine.parameters import DATA, read_turbine_file
+from fatigue_runner.turbine.parameters import DATA
 from fatigue_runner.turbine.table_builder import PITCH_DEG, TABLE_NAMES, TIP_SPEED_RATIO, load_coefficients
 from fatigue_runner.turbine.tables import read_tables
 

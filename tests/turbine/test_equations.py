@@ -9,8 +9,9 @@ from independent_model import IndependentModel
 
 from fatigue_runner.integrators import simulate_block
 from fatigue_runner.turbine import load_turbine
+from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.generated import kernel
-from fatigue_runner.turbine.parameters import at_pitch, equation_parameters, read_turbine_file
+from fatigue_runner.turbine.parameters import at_pitch, equation_parameters
 from fatigue_runner.wind import ConstantWind
 
 RATIO = np.linspace(0.5, 15, 30)

@@ -5,7 +5,7 @@ import pytest
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.turbine.aerodynamics import LOAD_NAMES, rotor_loads
-from fatigue_runner.turbine.parameters import read_turbine_file
+from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.span_weight import span_weight
 from fatigue_runner.turbine.table_builder import turbine_blade
 

@@ -8,7 +8,8 @@ import pytest
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import simulate_block
 from fatigue_runner.turbine import load_turbine, table_builder
-from fatigue_runner.turbine.parameters import DATA, at_pitch, read_turbine_file
+from fatigue_runner.turbine.file import read_turbine_file
+from fatigue_runner.turbine.parameters import DATA, at_pitch
 from fatigue_runner.wind import ConstantWind
 
 # OpenFAST 5.0, the same degrees of freedom, quasi-steady BEM, k = 0.0255764 N.m/rpm^2, pitch 0, 8 m/s: rotor speed [rpm],

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from viewer_example import motion, shape
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.turbine.parameters import read_turbine_file
+from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.viewer import colours, shapes
 from fatigue_runner.viewer.scene import local_wind
 

@@ -11,7 +11,7 @@ import numpy as np
 from fatigue_runner.channels import LOAD_NAMES
 from fatigue_runner.logbook import write_log
 from fatigue_runner.trajectory import Trajectory
-from fatigue_runner.turbine.parameters import read_turbine_file
+from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.viewer.scene import Geometry, geometry
 
 ROTOR_SPEED = 1.2  # rad/s
