@@ -187,8 +187,8 @@ Speeds = Annotated[
 
 class Winds(Section):
     """`type: constant` with `speeds`, `vertical_shear`, `horizontal_shear` (lists, every combination), or `type: turbulent` with
-    `speeds: {start, stop, count}`, `intensity: [low, high]`, `shear_exponent: [low, high]`, `seed`: one wind per speed, the two drawn;
-    `duration` [s]."""
+    `speeds: {start, stop, count}`, `intensity: [low, high]`, `shear_exponent: [low, high]`, `seed`: one wind per speed, the two drawn,
+    over a rotor of 63 m with its hub at 90 m whatever the turbine, so that a shipped recipe gives the shipped corrector; `duration` [s]."""
 
     type: Literal["constant", "turbulent"] = "turbulent"
     speeds: Speeds
@@ -219,7 +219,7 @@ class Winds(Section):
             TurbulentWind(
                 v, intensity=float(rng.uniform(*self.intensity)), shear_exponent=float(rng.uniform(*self.shear_exponent)),
                 seed=100_000 + 1000 * self.seed + number, duration=self.duration,
-                rotor_radius=63.0, hub_height=90.0,  # whatever the turbine: the shipped correctors were trained so
+                rotor_radius=63.0, hub_height=90.0,
             )
             for number, v in enumerate(self.speed_list)
         ]  # fmt: skip

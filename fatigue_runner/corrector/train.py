@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
-
 from fatigue_runner.corrector import families  # noqa: F401 - registers the recipes
 from fatigue_runner.corrector.artefact import save
 from fatigue_runner.corrector.binding import Binding, correctable
@@ -18,7 +16,7 @@ from fatigue_runner.corrector.corrector import Corrector
 from fatigue_runner.corrector.judging import validate
 from fatigue_runner.corrector.recipe import FAMILIES, Progress, Recipe
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import input_error
+from fatigue_runner.inputs.section import validated
 from fatigue_runner.inputs.source import Source, read_mapping
 
 if TYPE_CHECKING:
@@ -59,10 +57,7 @@ def read_recipe(
         for key in inside:
             section[key] = section = dict(section.get(key) or {})
         section[last] = seed
-    try:
-        return schema.model_validate(data), text
-    except ValidationError as error:
-        raise input_error(error, source) from None
+    return validated(schema, source, data), text
 
 
 def _schema(source: Source) -> type[Recipe]:

@@ -66,10 +66,13 @@ class Section(BaseModel):
         """Where a section says in words of its own what is missing."""
 
 
-def validated(model: type[M], source: Source) -> M:
-    """The data of a source as a section; raises InputError with one sentence and "file:line" per problem."""
+def validated(model: type[M], source: Source, data: Any = None) -> M:
+    """The data of a source as a section; raises InputError with one sentence and "file:line" per problem.
+
+    data: what is checked in place of the source's own, where values were laid over it.
+    """
     try:
-        return model.model_validate(source.data)
+        return model.model_validate(source.data if data is None else data)
     except ValidationError as error:
         raise input_error(error, source) from None
 

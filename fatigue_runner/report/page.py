@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import base64
-import os
 from pathlib import Path
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.report.rundata import Run, load_run
 
 
@@ -14,10 +14,8 @@ def write_report(run_dir: Path) -> Path:
     """Write `report.html` into `run_dir` and return its path; only a whole new one replaces an older."""
     html = render(load_run(run_dir))
     target = run_dir / "report.html"
-    draft = run_dir / ".report.html.part"
     try:
-        draft.write_text(html, encoding="utf-8")
-        os.replace(draft, target)
+        write_atomically(target, html.encode())
     except OSError as error:
         raise InputError(f"{target} cannot be written: {error.strerror}; make the folder writable") from None
     return target

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.errors import FatigueRunnerError, InputError
+from fatigue_runner.inputs.source import read_mapping
 from fatigue_runner.results.cells import Row, number, text
 from fatigue_runner.results.columns import WIND
 from fatigue_runner.results.ranking import MethodSummary, fatigue_columns, integrator_key, rank, reference_of
@@ -144,20 +145,7 @@ def _read_settings(folder: Path) -> tuple[Mapping[str, Any], Mapping[str, str]]:
 
 
 def _read_campaign(path: Path) -> Mapping[str, Any]:
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    if not path.is_file():
-        return {}
-    try:
-        campaign = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
-        raise InputError(
-            f"{path} cannot be read: {str(error).splitlines()[0]}; run the campaign again"
-        ) from None
-    if campaign is not None and not isinstance(campaign, Mapping):
-        raise InputError(f"{path} is not a campaign: it must be a mapping of keys to values")
-    return campaign or {}
+    return read_mapping(path, "campaign", "name, duration, ...").data if path.is_file() else {}
 
 
 def _read_log(path: Path) -> Log | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.inputs.source import parse_mapping
 from fatigue_runner.logbook import Log, LogError, read_log, read_metadata
 from fatigue_runner.naming import integrator_label
 from fatigue_runner.results.columns import WIND
@@ -149,14 +150,12 @@ def turbine_of(log: Log) -> dict[str, Any]:
 
 def _mapping(log: Log, name: str) -> dict[str, Any]:
     """An attached YAML file; empty where there is none."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
     try:
-        given = YAML(typ="safe", pure=True).load(log.attachments.get(name, b"").decode())
-    except (YAMLError, UnicodeDecodeError):
+        return dict(
+            parse_mapping(log.attachments.get(name, b"").decode(), Path(name), "log's attachment", "").data
+        )
+    except (InputError, UnicodeDecodeError):
         return {}
-    return given if isinstance(given, dict) else {}
 
 
 def check_turbine(path: Path, log: Log, shape: Geometry) -> None:

@@ -260,7 +260,7 @@ def test_the_same_run_gives_the_same_bytes(folder, rows, logs):
     logs(rows)
     before = (folder / "report.html").read_bytes()
     assert write_report(folder).read_bytes() == before
-    assert not list(folder.glob(".report*"))
+    assert not list(folder.glob("*.part"))
 
 
 @pytest.mark.parametrize(
@@ -272,8 +272,8 @@ def test_the_same_run_gives_the_same_bytes(folder, rows, logs):
         ("results.csv", "case_id\n\udce9".encode("utf-8", "surrogateescape"), "cannot be read as CSV"),
         ("run.json", "{", "run.json cannot be read"),
         ("run.json", "[]", "run.json cannot be read"),
-        ("campaign.yaml", "a: [", "campaign.yaml cannot be read"),
-        ("campaign.yaml", "- 1", "is not a campaign"),
+        ("campaign.yaml", "a: [", "campaign.yaml:1: not valid YAML"),
+        ("campaign.yaml", "- 1", "campaign.yaml:1: a campaign is a mapping"),
     ],
 )
 def test_a_folder_that_is_no_run_is_refused_in_one_sentence(tmp_path, rows, name, content, words):

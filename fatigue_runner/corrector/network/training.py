@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import hashlib
+import io
 import itertools
 import json
 import os
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from fatigue_runner.corrector.network.pairs import Pairs, Scaling, fold
 from fatigue_runner.corrector.network.settings import NetworkSettings
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.files import write_atomically
 
 Array = NDArray[np.float64]
 Progress = Callable[[dict[str, float]], None]
@@ -300,9 +302,9 @@ def make_folder(path: Path) -> None:
 
 
 def _write(state: dict[str, Any], path: Path) -> None:
-    part = path.with_name(path.name + ".part")
-    torch.save(state, part)
-    part.replace(path)
+    content = io.BytesIO()
+    torch.save(state, content)
+    write_atomically(path, content.getvalue())
 
 
 @contextmanager
