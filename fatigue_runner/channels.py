@@ -5,45 +5,11 @@ Moments are about the blade-root and tower-base axes as OpenFAST's RootMyb/RootM
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from fatigue_runner.layout import T2B1I1CG
+from fatigue_runner.layout import Channel as Channel
 
-
-@dataclass(frozen=True)
-class Channel:
-    """One signal: its name everywhere, its SI unit, and how a person reads it (value * `scale` in `read_unit`)."""
-
-    name: str
-    unit: str
-    label: str
-    read_unit: str
-    scale: float = 1.0
-
-
-STATES = (
-    Channel("tower_fore_aft", "m", "tower-top fore-aft", "m"),
-    Channel("tower_side_side", "m", "tower-top side-side", "m"),
-    Channel("blade1_flap", "m", "blade 1 flap", "m"),
-    Channel("blade2_flap", "m", "blade 2 flap", "m"),
-    Channel("blade3_flap", "m", "blade 3 flap", "m"),
-    Channel("edge", "m", "collective edge", "m"),
-    Channel("rotor_azimuth", "rad", "rotor azimuth", "deg", 57.29577951308232),
-    Channel("generator_azimuth", "rad", "generator azimuth (high-speed side)", "deg", 57.29577951308232),
-    Channel("tower_fore_aft_velocity", "m/s", "tower-top fore-aft velocity", "m/s"),
-    Channel("tower_side_side_velocity", "m/s", "tower-top side-side velocity", "m/s"),
-    Channel("blade1_flap_velocity", "m/s", "blade 1 flap velocity", "m/s"),
-    Channel("blade2_flap_velocity", "m/s", "blade 2 flap velocity", "m/s"),
-    Channel("blade3_flap_velocity", "m/s", "blade 3 flap velocity", "m/s"),
-    Channel("edge_velocity", "m/s", "collective edge velocity", "m/s"),
-    Channel("rotor_speed", "rad/s", "rotor speed", "rpm", 9.549296585513721),
-    Channel("generator_speed", "rad/s", "generator speed", "rpm", 9.549296585513721),
-)
-
-# The list is open at its end: rotationally sampled turbulence adds the higher azimuthal harmonics there.
-WIND_SIGNALS = (
-    Channel("wind_speed", "m/s", "hub-height wind speed", "m/s"),
-    Channel("vertical_shear", "-", "linear vertical shear", "-"),
-    Channel("horizontal_shear", "-", "linear horizontal shear", "-"),
-)
+STATES = T2B1I1CG.states
+WIND_SIGNALS = T2B1I1CG.wind
 
 LOADS = (
     Channel("tower_base_fore_aft_moment", "N.m", "tower-base fore-aft moment", "kN·m", 1e-3),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from simulating import simulate_block
 
-from fatigue_runner.integrators import simulate_block
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import TurbulentWind
 
@@ -17,7 +17,8 @@ def turbine():
 
 
 def wind(speed=8.0, seed=4, duration=40.0):
-    return TurbulentWind(speed, intensity=0.14, seed=9_100_000 + seed, duration=duration)
+    found = TurbulentWind(speed, intensity=0.14, seed=9_100_000 + seed, duration=duration)
+    return found.on(turbine().rotor)
 
 
 def start(off=True):

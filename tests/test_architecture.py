@@ -19,6 +19,7 @@ PACKAGE = Path(fatigue_runner.__file__).parent
 FLOOR = {
     "errors",
     "channels",
+    "layout",
     "naming",
     "trajectory",
     "compiled",

@@ -97,7 +97,7 @@ def _pitch(campaign: Campaign, turbine: Turbine, source: Source) -> float | Pitc
     pitch = campaign.blade_pitch
     try:
         if isinstance(pitch, PitchSeries):
-            pitch.cells(turbine, campaign.duration)
+            pitch.cells(turbine.pitch_range, campaign.duration)
             turbine.pitched_kernel_data()
         else:
             turbine.kernel_data(pitch)

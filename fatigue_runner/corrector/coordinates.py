@@ -20,12 +20,15 @@ from fatigue_runner.corrector.features import (
     ROTOR_SPEED,
     STATE_BLADES,
 )
-from fatigue_runner.integrators import exponential_adams as adams
+from fatigue_runner.integrators import multi_blade
+from fatigue_runner.layout import T2B1I1CG
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
 Array = NDArray[np.float64]
+_TURN = multi_blade.transforms(T2B1I1CG)
+
 Turn = tuple[Array, Array]  # cosine and sine (n,) of the azimuth
 
 
@@ -55,9 +58,9 @@ def accelerations(turbine: Turbine, x: Array, wind: Array) -> Array:
 
 
 def nonlinear_part(turbine: Turbine, x: Array, wind: Array, damping: float) -> Array:
-    """(n, freedoms) accelerations without their linear part; damping [1/s]: see `exponential_adams.linear`."""
+    """(n, freedoms) accelerations without their linear part; damping [1/s]: see `multi_blade.linear`."""
     ratio = turbine.parameters["g_ratio"]
-    linear = relative(x, ratio) @ adams.linear(turbine, 0.0, damping).low.T
+    linear = relative(x, ratio) @ multi_blade.linear(turbine, 0.0, damping).low.T
     return np.asarray(accelerations(turbine, x, wind) - linear)
 
 
@@ -73,19 +76,19 @@ def _turned(values: Array, first: tuple[int, ...], turn: Turn, sign: int) -> Arr
 
 def from_fixed(change: Array, turn: Turn) -> Array:
     """(n, states) changes of the state from multi-blade coordinates."""
-    return np.asarray(_turned(change, STATE_BLADES, turn, -1) @ np.linalg.inv(adams.T_STATE).T)
+    return np.asarray(_turned(change, STATE_BLADES, turn, -1) @ np.linalg.inv(_TURN.state).T)
 
 
 def to_fixed(change: Array, turn: Turn) -> Array:
     """(n, states) changes of the state in multi-blade coordinates."""
-    return _turned(change @ adams.T_STATE.T, STATE_BLADES, turn, 1)
+    return _turned(change @ _TURN.state.T, STATE_BLADES, turn, 1)
 
 
 def relative_to_fixed(values: Array, turn: Turn) -> Array:
     """(n, states - 1) relative coordinates in multi-blade form."""
-    return _turned(values @ adams.T_RELATIVE.T, RELATIVE_BLADES, turn, 1)
+    return _turned(values @ _TURN.relative.T, RELATIVE_BLADES, turn, 1)
 
 
 def parts_to_fixed(parts: Array, turn: Turn) -> Array:
     """(n, freedoms) nonlinear parts in multi-blade form."""
-    return _turned(parts @ adams.T_PARTS.T, PART_BLADES, turn, 1)
+    return _turned(parts @ _TURN.parts.T, PART_BLADES, turn, 1)

@@ -89,30 +89,28 @@ def single_steps(
 ) -> Samples:
     """One step of the Runge-Kutta method `method`, and one in `substeps` of `accurate`, from each of states (n, states) under wind pieces
     (n, m, 4, signals)."""
-    from fatigue_runner.integrators.correction import RAW_ROWS
-    from fatigue_runner.integrators.defects import step_samples
-    from fatigue_runner.integrators.kernel_data import runge_kutta_data, stage_rows
-    from fatigue_runner.turbine.lanes import LANES, from_groups, to_groups, work_space
+    from fatigue_runner.integrators.runge_kutta import runge_kutta_arrays, stage_rows
+    from fatigue_runner.integrators.single_steps import step_samples
+    from fatigue_runner.turbine.lanes import LANES, counters, from_groups, to_groups
 
     n = len(states)
     x = to_groups(np.ascontiguousarray(states.T))
     count = pieces.shape[1]
     cells = to_groups(np.ascontiguousarray(pieces.reshape(n, -1).T)).reshape(len(x), count, 4, -1)
     tableaux: Any = find_method(method), find_method(accurate)
-    own, finer = (runge_kutta_data(tableau) for tableau in tableaux)
-    stages = len(own[0][3])
-    width = len(features.stage_aware(stages))
-    rows, raw = np.empty((len(x), width * LANES)), np.empty((len(x), RAW_ROWS * LANES))
+    own, finer = (runge_kutta_arrays(tableau) for tableau in tableaux)
+    stages = len(own.stages.c)
+    width, seen = len(features.stage_aware(stages)), len(features.raw())
+    rows, raw = np.empty((len(x), width * LANES)), np.empty((len(x), seen * LANES))
     plain, exact = np.empty_like(x), np.empty_like(x)
     data = turbine.kernel_data(0.0)
-    scratch, row, clamped = work_space()
     step_samples(
-        x, cells, step / count, own[:2], stage_rows(stages), step, finer[:2], substeps, turbine.parameters["g_ratio"],
-        (data.tables, data.cells, data.constants, scratch, row), clamped, rows, raw, plain, exact,
+        data.model, x, cells, step / count, own, stage_rows(stages), step, finer, substeps, turbine.gearbox_ratio,
+        data.arrays(counters()), rows, raw, plain, exact,
     )  # fmt: skip
     return Samples(
         from_groups(rows, width, n).T.copy(),
-        from_groups(raw, RAW_ROWS, n).T.copy(),
+        from_groups(raw, seen, n).T.copy(),
         from_groups(plain, features.STATES, n).T.copy(),
         from_groups(exact, features.STATES, n).T.copy(),
         pieces,

@@ -22,7 +22,6 @@ from fatigue_runner.corrector.coordinates import (
     relative_to_fixed,
     turn_of,
 )
-from fatigue_runner.integrators import exponential_adams as adams
 
 if TYPE_CHECKING:
     from fatigue_runner.trajectory import Trajectory
@@ -71,9 +70,9 @@ def collect(
     learned_ahead: Array | None,
 ) -> Steps:
     """Steps from random places of true trajectories `runs`, sampled every `step` [s]; learned_ahead (states, rows): part of the predictor;
-    damping [1/s]: see `exponential_adams.linear`."""
+    damping [1/s]: see `multi_blade.linear`."""
     rng = np.random.Generator(np.random.PCG64(seed))
-    ahead_base, plain_base = adams.matrices(turbine, method, step, 0.0, past, damping)
+    ahead_base, plain_base = method.matrices(turbine, step, 0.0, past, damping)
     ahead_all = ahead_base if learned_ahead is None else ahead_base + learned_ahead
     picks = [rng.integers(past + WARM, len(run.time) - 1, per_wind) for run in runs]
 

@@ -26,7 +26,7 @@ def fallback_substeps(turbine: Turbine, method: str, step: float, history: int =
     """0 where a method of the next order shares the stages and is stable at this step [s]; else the fewest substeps, two or more,
     that keep the method itself a tenth below its stability limit."""
     from fatigue_runner.integrators import stability_limit
-    from fatigue_runner.integrators.correcting import SHARING
+    from fatigue_runner.integrators.methods import SHARING
 
     if method in SHARING and not history and step <= stability_limit(turbine, SHARING[method]):
         return 0
@@ -40,7 +40,7 @@ def fallback_substeps(turbine: Turbine, method: str, step: float, history: int =
 
 def fallback_results(turbine: Turbine, method: str, step: float, substeps: int, samples: Samples) -> Array:
     """(n, states) what the fallback makes of the samples' steps."""
-    from fatigue_runner.integrators.correcting import SHARING
+    from fatigue_runner.integrators.methods import SHARING
 
     assert samples.pieces is not None
     if substeps == 0:

@@ -1,254 +1,292 @@
-"""Compiled time loop with a learned correction of the local error: enhanced, and guarded (hybrid).
+"""Runge-Kutta methods with a learned correction of the local error: enhanced, and guarded (hybrid).
 
-Enhanced: x+ = eta_h(x) + h^(p+1) N. Hybrid (arXiv 2504.05493, algorithm 1, mended): accepted where the corrected result agrees
-with that of a method of order p + 1, the fallback; else the fallback is taken. So every step ends within `limit` scaled units of it.
+Enhanced: x+ = eta_h(x) + h^(p+1) N. Hybrid: accepted where the corrected result agrees with that of the fallback, a method of order
+p + 1 that shares the stages or smaller steps of the same method; else the fallback is taken (see `guard`).
 """
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any, NamedTuple, Protocol
 
-from fatigue_runner.compiled import LEAN, njit
+import numpy as np
+from numpy.typing import NDArray
+
+from fatigue_runner.compiled import INLINE, LEAN, njit
+from fatigue_runner.errors import InputError
+from fatigue_runner.integrators.choice import compiled_for
+from fatigue_runner.integrators.contract import Aligned, Prepared, Task
 from fatigue_runner.integrators.correction import correction
-from fatigue_runner.integrators.loops import RING, stages_of_step
+from fatigue_runner.integrators.dense import blocks_of
+from fatigue_runner.integrators.guard import GuardUnits, guard, guard_units, norm_of, refuse_outside
+from fatigue_runner.integrators.runge_kutta import (
+    Stages,
+    Sum,
+    Tableau,
+    nothing_to_forget,
+    result_of,
+    runge_kutta_arrays,
+    slope_rows,
+    stage_rows,
+    stages_of,
+    stages_of_step,
+)
+from fatigue_runner.integrators.signals import Signals, signals_at
+from fatigue_runner.integrators.stepper import RING, advance, begin, finish, note, recover
 from fatigue_runner.integrators.stepping import (
-    WIDTH,
-    WIND,
+    add,
     all_fine,
     combine,
     keep,
-    mark_diverged,
+    keep_largest,
+    move,
     note_step,
-    wind_at,
-    write_output,
+    subtract,
 )
-from fatigue_runner.turbine.generated import kernel
-from fatigue_runner.turbine.generated.kernel import LANES
+from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.model import rhs, width, wind_signals
 
-_rhs = kernel.rhs
-NORM_MAX, NORM_RMS = 0, 1
+Array = NDArray[np.float64]
+
 STARTING = 32  # substeps of a step before there is a history; with few, the start's error outweighs that of the run (measured)
 MOST_ROWS = 512  # of features with their factors, and of a hidden layer
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
-def guard(x, fallback, corrected, units, limit, norm, scaled, accepted, discrepancy):
-    """x = corrected where its scaled distance from the fallback is within the limit, else the fallback; per lane.
+class Correctable(Tableau, Protocol):
+    """A tableau that may share its stages with that of the next order."""
 
-    units = (1 / atol (WIDTH,), rtol / atol (WIDTH,) or nothing). Compiled without fastmath: a comparison with NaN must be false, so
-    that a NaN correction is refused. scaled (WIDTH,): room. Loops over whole states with one result each, and halves against each
-    other instead of a loop over the states: so they vectorise.
-    """
-    inverse, relative = units
-    if len(relative) == 0:
-        for m in range(WIDTH):
-            scaled[m] = abs(corrected[m] - fallback[m]) * inverse[m]
+    @property
+    def shared_by(self) -> Tableau | None: ...
+
+    def evaluations(self, steps: int) -> int: ...
+
+
+class Fallback(NamedTuple):
+    """The method that a refused step takes: the stages from `shared` on come on top of the method's own; or `substeps` steps of it."""
+
+    stages: Stages
+    result: Sum
+    shared: int
+    substeps: int
+
+
+class Tested(NamedTuple):
+    """The hybrid's acceptance test; low, high: bounds of the rows that the map sees behind the leading 1, or nothing."""
+
+    hybrid: bool
+    units: GuardUnits
+    limit: float
+    norm: int
+    low: Array
+    high: Array
+
+
+class Room(NamedTuple):
+    """plain, fixed, other, defect: states; start, middle: winds; seen, hidden: the map's; inner_...: the fallback's substeps."""
+
+    plain: Array
+    fixed: Array
+    other: Array
+    defect: Array
+    start: Array
+    middle: Array
+    seen: Array
+    hidden: Array
+    judged: tuple[Array, NDArray[np.bool_]]
+    scaled: Array
+    inner_states: Array
+    inner_k: Array
+    inner_wind: Array
+    inner_stage: Array
+    inner_slope: Array
+
+
+class CorrectedArrays(NamedTuple):
+    """A map that looks back at `history` steps begins when it can: until then the fallback steps."""
+
+    stages: Stages
+    result: Sum
+    stage_rows: NDArray[np.int64]
+    learned: Any
+    history: int
+    fallback: Fallback
+    tested: Tested
+    room: Room
+
+
+def prepare(method: Correctable, task: Task) -> Prepared:
+    """A Runge-Kutta method with the task's corrector. Raises CorrectorError where that does not fit."""
+    corrector, stages = task.corrector, method.evaluations_per_step
+    corrector.bind(task.turbine, method.name, task.step)
+    judge, own = corrector.guard, runge_kutta_arrays(method)
+    if judge.substeps == 0:
+        fallback, extra = _sharing(method, corrector.name)
     else:
-        for m in range(WIDTH):
-            scale = 1.0 + max(abs(x[m]), abs(fallback[m])) * relative[m]
-            scaled[m] = abs(corrected[m] - fallback[m]) * inverse[m] / scale
-    for m in range(WIDTH):
-        size = scaled[m]
-        scaled[m] = size if size < np.inf else np.inf
-    if norm == NORM_RMS:
-        for m in range(WIDTH):
-            scaled[m] *= scaled[m] * 0.0625
-        for half in (8, 4, 2, 1):
-            for m in range(half * LANES):
-                scaled[m] += scaled[half * LANES + m]
-        for j in range(LANES):
-            scaled[j] = np.sqrt(scaled[j])
-    else:
-        for half in (8, 4, 2, 1):
-            for m in range(half * LANES):
-                size, other = scaled[m], scaled[half * LANES + m]
-                scaled[m] = size if size > other else other
-    for j in range(LANES):
-        before, size = discrepancy[j], scaled[j]
-        discrepancy[j] = before if before > size else size
-        accepted[j] = accepted[j] & (size <= limit)
-    for half in (1, 2, 4, 8):
-        for m in range(half * LANES):
-            scaled[half * LANES + m] = scaled[m]
-    for m in range(WIDTH):
-        # both are read first: so the choice is a vector's, not a branch
-        good, safe = corrected[m], fallback[m]
-        x[m] = good if scaled[m] <= limit else safe
+        # tables of its own: the step writes the current slope's row into them
+        fallback = Fallback(stages_of(method), result_of(method), 0, judge.substeps)
+        extra = judge.substeps * stages - 1
+    limit, hybrid = float(judge.limit), task.mode == "hybrid"
+    bounds = np.array(judge.low), np.array(judge.high)
+    units = guard_units(judge.atol, judge.rtol)
+    tested = Tested(hybrid, units, limit, norm_of(judge), *bounds)
+    learned = corrector.map_data(task.turbine, task.pitch)
+
+    def arrays(start: Array, aligned: Aligned) -> CorrectedArrays:
+        room = _room(start, task, slope_rows(method), aligned)
+        return CorrectedArrays(
+            own.stages, own.result, stage_rows(stages), learned, corrector.history, fallback, tested, room
+        )
+
+    def evaluations(steps: int) -> int:
+        begun = min(steps, corrector.history)
+        more = (steps - begun) * extra if hybrid else 0
+        return method.evaluations(steps) + begun * (STARTING * stages - 1) + more
+
+    return Prepared(arrays, slope_rows(method), evaluations, limit if hybrid else np.nan)
 
 
-@njit(nogil=True, error_model="numpy", _nrt=False)
-def refuse_outside(features, low, high, fallback, x, accepted):
-    """x = fallback, not accepted, in lanes where a feature leaves [low, high] (one per feature after the leading 1; nothing: no bounds).
+def _sharing(method: Correctable, name: str) -> tuple[Fallback, int]:
+    """The fallback that shares the method's stages, and the evaluations that it costs beside."""
+    other = method.shared_by
+    if other is None:
+        raise InputError(
+            f"corrector {name}: {method.name} shares its stages with no method; its guard needs substeps"
+        )
+    stages = method.evaluations_per_step
+    return Fallback(stages_of(other), result_of(other), stages, 0), other.evaluations_per_step - stages
 
-    Compiled without fastmath: NaN lies outside.
-    """
-    for j in range(LANES):
-        inside = True
-        for i in range(len(low)):
-            value = features[(1 + i) * LANES + j]
-            inside = inside and low[i] <= value <= high[i]
-        if not inside:
-            accepted[j] = False
-            for i in range(16):
-                x[i * LANES + j] = fallback[i * LANES + j]
+
+def _room(start: Array, task: Task, slopes: int, aligned: Aligned) -> Room:
+    layout, width_ = task.layout, len(start)
+    padded, blown = 8 * blocks_of(layout.size) * LANES, len(layout.wind) * LANES
+    zeros = {
+        "plain": width_, "fixed": width_, "other": width_, "defect": padded, "start": blown, "middle": blown,
+        "seen": MOST_ROWS * LANES, "scaled": (1 << (layout.size - 1).bit_length()) * LANES,
+        "inner_wind": blown, "inner_stage": width_, "inner_slope": width_,
+    }  # fmt: skip
+    return Room(
+        **{name: aligned(np.zeros(size)) for name, size in zeros.items()},
+        hidden=aligned(np.zeros((2, MOST_ROWS * LANES))),
+        judged=(aligned(np.zeros(LANES)), np.ones(LANES, np.bool_)),
+        inner_states=np.zeros((3, width_)),
+        inner_k=aligned(np.zeros((slopes, width_))),
+    )
+
+
+# --- the step ---
 
 
 @njit(**LEAN)
-def fall_back(n, h, now, current, states, k, fallback, substeps, wind, model, clamped, work, out):
-    """Result of the fallback from `current`, which is states[now]: more stages on top of the method's own, or smaller steps.
+def _copy_wind(model, p, out):
+    for m in range(wind_signals(model) * LANES):
+        out[m] = p[m]
 
-    fallback = (stage table, result table, shared stages, substeps); `substeps` of them; work = (states (3, WIDTH), k, p, stage, slope).
-    """
-    (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), shared, _ = fallback
-    cell_duration, wind_cells, changing = wind
-    tables, cells, constants, scratch, row = model
-    own, k2, p, stage, slope = work
+
+@njit(**LEAN)
+def _first_slope_of(model, k, now, out):
+    for m in range(width(model)):
+        out[0, m] = k[now, m]
+
+
+@njit(**LEAN)
+def _fall_back(model, n, h, now, fallback, substeps, signals, data, ring, room):
+    """room.other = result of the fallback from ring.current, which is ring.states[now]."""
+    stages, result, k, c = fallback.stages, fallback.result, ring.k, fallback.stages.c
     if substeps == 0:
-        for i in range(shared, len(c)):
-            s_rows[i, 0] = now
-            combine(states, now, k, s_rows, s_weights, i, s_counts[i], h, stage)
-            wind_at((n + c[i]) * h, cell_duration, wind_cells, p)
-            _rhs(stage, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-            keep(slope, k, RING - 1 + i)
-        b_rows[0, 0] = now
-        combine(states, now, k, b_rows, b_weights, 0, b_count, h, out)
+        for i in range(fallback.shared, len(c)):
+            stages.rows[i, 0] = now
+            combine(
+                model, ring.states, now, k, stages.rows, stages.weights, i, stages.counts[i], h, room.inner_stage
+            )  # fmt: skip
+            inner = Signals(
+                signals.cell_duration, signals.cells, signals.changing, signals.control, room.inner_wind, signals.u
+            )  # fmt: skip
+            signals_at(model, (n + c[i]) * h, inner)
+            rhs(model, room.inner_stage, inner.p, inner.u, room.inner_slope, 0, data)
+            keep(model, room.inner_slope, k, RING - 1 + i)
+        result.rows[0, 0] = now
+        combine(model, ring.states, now, k, result.rows, result.weights, 0, result.terms, h, room.other)
     else:
-        small = h / substeps
-        b_rows[0, 0] = 0
-        keep(current, own, 0)
-        for m in range(WIDTH):
-            k2[0, m] = k[now, m]
+        small, own, k2, out = h / substeps, room.inner_states, room.inner_k, room.other
+        inner = Signals(
+            signals.cell_duration, signals.cells, signals.changing, signals.control, room.inner_wind, signals.u
+        )  # fmt: skip
+        result.rows[0, 0] = 0
+        keep(model, ring.current, own, 0)
+        _first_slope_of(model, k, now, k2)
         for i in range(substeps):
             number = n * substeps + i
             # with constant wind, too: p must hold the wind at the sub-step's start
-            wind_at(number * small, cell_duration, wind_cells, p)
+            signals_at(model, number * small, inner)
             if i > 0:
-                _rhs(out, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-                keep(slope, k2, 0)
-                keep(out, own, 0)
-            stages_of_step(
-                number, small, 0, own, k2, s_rows, s_weights, s_counts, c, cell_duration, wind_cells, changing,
-                tables, cells, constants, scratch, row, clamped, p, stage, slope,
-            )  # fmt: skip
-            combine(own, 0, k2, b_rows, b_weights, 0, b_count, small, out)
+                rhs(model, out, inner.p, inner.u, room.inner_slope, 0, data)
+                keep(model, room.inner_slope, k2, 0)
+                keep(model, out, own, 0)
+            stages_of_step(model, stages, number, small, 0, own, k2, inner, data, room.inner_stage)
+            combine(model, own, 0, k2, result.rows, result.weights, 0, result.terms, small, out)
 
 
-@njit(**LEAN)
-def add(plain, defect, out):
-    """out = plain + defect"""
-    for m in range(WIDTH):
-        out[m] = plain[m] + defect[m]
+@compiled_for(begin, CorrectedArrays)
+@njit(**INLINE)
+def _begin(method, model, h, signals, data, ring):
+    _copy_wind(model, signals.p, method.room.start)
+    _copy_wind(model, signals.p, method.room.middle)
+    rhs(model, ring.current, signals.p, signals.u, ring.slope, 0, data)
+    keep(model, ring.slope, ring.k, 0)
 
 
-@njit(**LEAN)
-def subtract(a, b, out):
-    """out = a - b"""
-    for m in range(WIDTH):
-        out[m] = a[m] - b[m]
+compiled_for(recover, CorrectedArrays)(nothing_to_forget)
 
 
-@njit(**LEAN)
-def move(source, target):
-    """target = source"""
-    for m in range(WIDTH):
-        target[m] = source[m]
-
-
-@njit(**LEAN)
-def keep_largest(defect, largest):
-    """largest = max(largest, |defect|)"""
-    for m in range(WIDTH):
-        largest[m] = max(largest[m], abs(defect[m]))
-
-
-@njit(**LEAN)
-def corrected_steps(
-    h, steps, method, network, safety, wind, model, plan, work, rows, status, diverged_at, clamped
-):
-    """Advance one group by `steps` corrected steps of size h, as `loops.runge_kutta`, and
-
-    method = (stage table, result table, rows of the stage slopes); network as `correction.correction`;
-    safety = (hybrid, fallback, `correcting.guard_units`, limit, norm, bounds of the features (low, high)); work =
-    `working_arrays`. A network that looks back at earlier steps begins when it can: until then the fallback steps.
-    status = (accepted, discrepancy, local error) (n - 1, LANES) are written: the worst since the last step with outputs, in the
-    row of a step's first output.
-    """
-    (s_rows, s_weights, s_counts, c), (b_rows, b_weights, b_count), stage_rows = method
-    hybrid, fallback, units, limit, norm, (low, high) = safety
-    cell_duration, wind_cells, changing = wind
-    tables, cells, constants, scratch, row = model
-    out_step, exact, position, velocity = plan
-    (
-        (states, k, restart, current, stage, slope, plain, fixed, other, defect, largest),
-        (p, start, middle),
-        buffers,
-        (discrepancy, accepted, scaled),
-        inner,
-    ) = work
-    features, hidden = buffers
-    now, output, all_diverged, history = 0, 1, False, network[2]
-
-    keep(restart, rows, 0)
-    wind_at(0.0, cell_duration, wind_cells, p)
-    for m in range(WIND):
-        start[m] = p[m]
-        middle[m] = p[m]
-    _rhs(current, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-    keep(slope, k, 0)
-    for n in range(steps):
-        new = (now + 1) % 3
-        at = stages_of_step(
-            n, h, now, states, k, s_rows, s_weights, s_counts, c, cell_duration, wind_cells, changing,
-            tables, cells, constants, scratch, row, clamped, p, stage, slope,
-        )  # fmt: skip
-        b_rows[0, 0] = now
-        combine(states, now, k, b_rows, b_weights, 0, b_count, h, plain)
-        if changing:
-            wind_at((n + 0.5) * h, cell_duration, wind_cells, middle)
-            if at != 1.0:
-                wind_at((n + 1) * h, cell_duration, wind_cells, p)
-        stage_rows[0] = now
-        correction(current, k, stage_rows, h, start, middle, p, network, features, hidden, defect)
-        if hybrid or n < history:
-            substeps = STARTING if n < history else fallback[3]
-            fall_back(n, h, now, current, states, k, fallback, substeps, wind, model, clamped, inner, other)
-            if n < history:
-                move(other, current)
-            else:
-                add(plain, defect, fixed)
-                guard(current, other, fixed, units, limit, norm, scaled, accepted, discrepancy)
-                if len(low) > 0:
-                    refuse_outside(features, low, high, other, current, accepted)
-            # the logged error estimate is the embedded one, not the learned one
-            subtract(other, plain, defect)
-        else:
-            add(plain, defect, current)
-        keep_largest(defect, largest)
-        if not all_fine(current):
-            all_diverged = mark_diverged(current, (n + 1) * h, diverged_at, restart)
-        keep(current, states, new)
-        _rhs(current, p, slope, 0, tables, cells, constants, scratch, row, clamped)
-        keep(slope, k, new)
-        for m in range(WIND):
-            start[m] = p[m]
-        now, first = new, output
-        while output < len(out_step) and out_step[output] <= n + 1:
-            write_output(output, exact, position, velocity, h, states, k, now, rows)
-            output += 1
-        if output > first:
-            note_step((discrepancy, accepted), largest, current, status, first - 1)
-        if all_diverged:
-            break
-
-
-def working_arrays(start, slopes, aligned):
-    """`work` of `corrected_steps` for the initial states `start` (WIDTH,) and `slopes` rows of k; aligned: copies onto cache lines."""
-    wide = [aligned(np.zeros(WIDTH)) for _ in range(7)]  # stage, slope, plain, fixed, other, defect, largest
-    states, k = aligned(np.stack([start] * 3)), aligned(np.zeros((slopes, WIDTH)))
-    winds = tuple(aligned(np.zeros(WIND)) for _ in range(3))
-    buffers = (aligned(np.zeros(MOST_ROWS * LANES)), aligned(np.zeros((2, MOST_ROWS * LANES))))
-    inner = (
-        np.zeros((3, WIDTH)), aligned(np.zeros_like(k)), np.zeros(WIND), aligned(np.zeros(WIDTH)), aligned(np.zeros(WIDTH)),
+@compiled_for(advance, CorrectedArrays)
+@njit(**INLINE)
+def _advance(method, model, n, h, now, new, signals, data, ring):
+    room, tested, result, current = method.room, method.tested, method.result, ring.current
+    # stages are made in a room of their own: the map sees the step's start
+    at = stages_of_step(model, method.stages, n, h, now, ring.states, ring.k, signals, data, ring.slope)
+    result.rows[0, 0] = now
+    combine(model, ring.states, now, ring.k, result.rows, result.weights, 0, result.terms, h, room.plain)
+    if signals.changing:
+        inner = Signals(
+            signals.cell_duration, signals.cells, signals.changing, signals.control, room.middle, signals.u
+        )
+        signals_at(model, (n + 0.5) * h, inner)
+        if at != 1.0:
+            signals_at(model, (n + 1) * h, signals)
+    method.stage_rows[0] = now
+    correction(
+        method.learned, model, current, ring.k, method.stage_rows, h, room.start, room.middle, signals.p, room.seen, room.hidden,
+        room.defect,
     )  # fmt: skip
-    judged = (aligned(np.zeros(LANES)), np.ones(LANES, np.bool_), aligned(np.zeros(WIDTH)))
-    return (states, k, aligned(start), aligned(start), *wide), winds, buffers, judged, inner
+    if tested.hybrid or n < method.history:
+        substeps = STARTING if n < method.history else method.fallback.substeps
+        _fall_back(model, n, h, now, method.fallback, substeps, signals, data, ring, room)
+        if n < method.history:
+            move(model, room.other, current)
+        else:
+            add(model, room.plain, room.defect, room.fixed)
+            guard(
+                model, current, room.other, room.fixed, tested.units, tested.limit, tested.norm, room.scaled, room.judged
+            )  # fmt: skip
+            if len(tested.low) > 0:
+                refuse_outside(model, room.seen, tested.low, tested.high, room.other, current, room.judged[1])
+        # the logged error estimate is the embedded one, not the learned one
+        subtract(model, room.other, room.plain, room.defect)
+    else:
+        add(model, room.plain, room.defect, current)
+    keep_largest(model, room.defect, ring.largest)
+    keep(model, current, ring.states, new)
+    return all_fine(model, current)
+
+
+@compiled_for(finish, CorrectedArrays)
+@njit(**INLINE)
+def _finish(method, model, n, h, now, new, wanted, signals, data, ring):
+    rhs(model, ring.current, signals.p, signals.u, ring.slope, 0, data)
+    keep(model, ring.slope, ring.k, new)
+    _copy_wind(model, signals.p, method.room.start)
+
+
+@compiled_for(note, CorrectedArrays)
+@njit(**INLINE)
+def _note(method, model, ring, out, interval):
+    note_step(model, method.room.judged, ring.largest, ring.current, out, interval)

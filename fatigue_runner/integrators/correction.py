@@ -1,46 +1,69 @@
-"""Compiled pieces of a corrected step: what a corrector sees of a step, and dense layers over lanes.
+"""Compiled: the learned defect of a Runge-Kutta step, chosen by the type of the map's data (see `protocol`).
 
-Rows are [n][LANES], flat, as everywhere in the lane kernels.
+What a map sees are rows [n][LANES], flat, as everywhere in the lane kernels. A new kind of map is a NamedTuple and a function that is
+registered for it, as the two below are.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba.core import cgutils, types
-from numba.extending import intrinsic
 
-from fatigue_runner.compiled import FAST, LEAN, njit
-from fatigue_runner.turbine.generated.kernel import LANES
+from fatigue_runner.compiled import INLINE, LEAN, njit
+from fatigue_runner.integrators.choice import compiled_for
+from fatigue_runner.integrators.dense import BLOCK, dense_rows, multiply
+from fatigue_runner.integrators.protocol import RawNetworkData, StageMapData
+from fatigue_runner.layout import Layout
+from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.model import constant, first_order, freedoms, rotor, rows, width, wind_signals
 
-BLOCK = 8  # outputs of a dense layer that are summed up side by side
-VECTOR = 8  # doubles in a vector; LLVM splits it where the machine's are shorter
 
-# rows before the stage accelerations: 1, six deflections, shaft twist, eight velocities, wind at start, middle and end, sin, cos
-FIXED_ROWS = 27
+def stage_part(layout: Layout) -> int:
+    """Rows of one stage: accelerations, of the shaft's twist in place of the generator's, and first-order slopes."""
+    return layout.freedoms + len(layout.first_order)
+
+
+def fixed_rows(layout: Layout) -> int:
+    """Rows before the stages: 1, the relative state, wind at start, middle and end, sine and cosine of the azimuth."""
+    return 1 + layout.relative_size + 3 * len(layout.wind) + 2
+
+
+def raw_rows(layout: Layout) -> int:
+    """1, the state as it is, the wind speed: what the paper's network sees."""
+    return 1 + layout.size + 1
+
+
+_first_stage = constant(fixed_rows)
+_stage_part = constant(stage_part)
+_first_wind = constant(lambda layout: 1 + layout.relative_size)
+_raw_rows = constant(raw_rows)
 
 
 @njit(**LEAN)
-def features(x, k, stage_rows, h, ratio, start, middle, end, rows):
-    """Rows of `corrector.features.names(stages)`: x (16, LANES), the stage slopes k[stage_rows], wind at three times."""
+def features(model, x, k, stage_rows, h, ratio, start, middle, end, rows):
+    """Rows of `corrector.features.stage_aware`: x the state, the stage slopes k[stage_rows], wind at three times."""
     inverse = 1.0 / ratio
+    n, drive, more = freedoms(model), rotor(model), first_order(model)
+    slip = 2 * n - 2
     for j in range(LANES):
         rows[j] = 1.0
-        rows[7 * LANES + j] = x[6 * LANES + j] - x[7 * LANES + j] * inverse
-        rows[15 * LANES + j] = x[14 * LANES + j] - x[15 * LANES + j] * inverse
-    for m in range(6 * LANES):
+        rows[(1 + drive) * LANES + j] = x[drive * LANES + j] - x[(drive + 1) * LANES + j] * inverse
+        rows[(1 + slip) * LANES + j] = x[(n + drive) * LANES + j] - x[(n + drive + 1) * LANES + j] * inverse
+    for m in range(drive * LANES):
         rows[LANES + m] = x[m]
-    for m in range(7 * LANES):
-        rows[8 * LANES + m] = x[8 * LANES + m]
-    for m in range(3 * LANES):
-        rows[16 * LANES + m] = start[m]
-        rows[19 * LANES + m] = middle[m]
-        rows[22 * LANES + m] = end[m]
+    for m in range((n - 1) * LANES):
+        rows[n * LANES + m] = x[n * LANES + m]
+    for m in range(more * LANES):
+        rows[(2 + slip) * LANES + m] = x[2 * n * LANES + m]
+    wind, signals = _first_wind(model), wind_signals(model)
+    for m in range(signals * LANES):
+        rows[wind * LANES + m] = start[m]
+        rows[(wind + signals) * LANES + m] = middle[m]
+        rows[(wind + 2 * signals) * LANES + m] = end[m]
+    turn = wind + 3 * signals
     for j in range(LANES):
-        phi = x[6 * LANES + j]
+        phi = x[drive * LANES + j]
         turns = math.floor(phi * 0.15915494309189535 + 0.5)
         q = (phi - turns * 6.283185307179586) * 0.25
         y = q * q
@@ -49,160 +72,48 @@ def features(x, k, stage_rows, h, ratio, start, middle, end, rows):
         cosine = 1.0 + y * (-0.5 + y * (1 / 24 + y * (-1 / 720 + y * (1 / 40320 - y / 3628800))))
         double = 2.0 * sine * cosine
         cosine = 1.0 - 2.0 * sine * sine
-        rows[25 * LANES + j] = 2.0 * double * cosine
-        rows[26 * LANES + j] = 1.0 - 2.0 * double * double
+        rows[turn * LANES + j] = 2.0 * double * cosine
+        rows[(turn + 1) * LANES + j] = 1.0 - 2.0 * double * double
     for i in range(len(stage_rows)):
         s = stage_rows[i]
         # unsigned: numba's check for negative places keeps LLVM from vectorising
-        first = np.uint64((FIXED_ROWS + 8 * i) * LANES)
-        for m in range(7 * LANES):
-            rows[first + np.uint64(m)] = h * k[s, 8 * LANES + m]
+        first = np.uint64((_first_stage(model) + _stage_part(model) * i) * LANES)
+        for m in range((n - 1) * LANES):
+            rows[first + np.uint64(m)] = h * k[s, n * LANES + m]
         for j in range(LANES):
-            slip = k[s, 14 * LANES + j] - k[s, 15 * LANES + j] * inverse
-            rows[first + np.uint64(7 * LANES + j)] = h * slip
+            slipping = k[s, (n + drive) * LANES + j] - k[s, (n + drive + 1) * LANES + j] * inverse
+            rows[first + np.uint64((n - 1) * LANES + j)] = h * slipping
+        for m in range(more * LANES):
+            rows[first + np.uint64(n * LANES + m)] = h * k[s, 2 * n * LANES + m]
 
 
 @njit(**LEAN)
-def remember(stages, history, rows):
+def _remember(model, stages, history, rows):
     """Move the last step's first-stage rows behind the stages, before `features` overwrites them; older ones one place on."""
-    first = (FIXED_ROWS + 8 * stages) * LANES
-    for m in range(first + 8 * LANES * history - 1, first + 8 * LANES - 1, -1):
-        rows[m] = rows[m - 8 * LANES]
+    part = _stage_part(model) * LANES
+    first = _first_stage(model) * LANES + part * stages
+    for m in range(first + part * history - 1, first + part - 1, -1):
+        rows[m] = rows[m - part]
     if history > 0:
-        for m in range(8 * LANES):
-            rows[first + m] = rows[FIXED_ROWS * LANES + m]
-
-
-@intrinsic
-def dense(typing_context, rows, weights, inputs, blocks, out):
-    """out = weights . rows for all lanes: rows (inputs, LANES), weights from `pack`, out (8 blocks, LANES), all flat.
-
-    Written in LLVM's vector types: eight outputs of all lanes stay in registers while the inputs pass by, each weight is one
-    broadcast. From Python loops LLVM spills the broadcasts, which costs four times as much (measured: 110 instead of 25 ns a lane
-    for 59 inputs and 16 outputs).
-    """
-    array = types.Array(types.float64, 1, "C")
-    signature = types.void(array, array, types.int64, types.int64, array)
-    vector = ir.VectorType(ir.DoubleType(), VECTOR)
-    parts = LANES // VECTOR
-
-    def codegen(context, builder, sig, args):
-        def data(i):
-            return context.make_array(sig.args[i])(context, builder, args[i]).data
-
-        def at(pointer, index):
-            return builder.bitcast(builder.gep(pointer, [index]), vector.as_pointer())
-
-        def aligned(value):
-            value.align = 8
-            return value
-
-        word = ir.IntType(64)
-        row, weight, result = data(0), data(1), data(4)
-        count = args[2]
-        lanes, block_size = word(LANES), word(BLOCK)
-        with cgutils.for_range(builder, args[3]) as block:
-            sums = [cgutils.alloca_once(builder, vector) for _ in range(BLOCK * parts)]
-            for slot in sums:
-                builder.store(ir.Constant(vector, [0.0] * VECTOR), slot)
-            first_weight = builder.mul(builder.mul(block.index, count), block_size)
-            with cgutils.for_range(builder, count) as feature:
-                place = builder.mul(feature.index, lanes)
-                x = [
-                    aligned(builder.load(at(row, builder.add(place, word(p * VECTOR))))) for p in range(parts)
-                ]
-                base = builder.add(first_weight, builder.mul(feature.index, block_size))
-                for o in range(BLOCK):
-                    w = builder.load(builder.gep(weight, [builder.add(base, word(o))]))
-                    undefined = ir.Constant(vector, ir.Undefined)
-                    single = builder.insert_element(undefined, w, ir.IntType(32)(0))
-                    mask = ir.Constant(ir.VectorType(ir.IntType(32), VECTOR), [0] * VECTOR)
-                    splat = builder.shuffle_vector(single, undefined, mask)
-                    for p in range(parts):
-                        slot = sums[o * parts + p]
-                        # contract: one fused multiply-add
-                        product = builder.fmul(splat, x[p], flags=("contract",))
-                        builder.store(builder.fadd(builder.load(slot), product, flags=("contract",)), slot)
-            target = builder.mul(builder.mul(block.index, block_size), lanes)
-            for i, slot in enumerate(sums):
-                aligned(builder.store(builder.load(slot), at(result, builder.add(target, word(i * VECTOR)))))
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-_dense: Any = dense  # its first argument is supplied by numba
-
-
-def pack(weights: np.ndarray) -> tuple[np.ndarray, int]:
-    """(n_out, n_in) weights in the order that `dense` reads, outputs padded to whole blocks; and the number of blocks."""
-    n_out, n_in = weights.shape
-    blocks = -(-n_out // BLOCK)
-    padded = np.zeros((blocks * BLOCK, n_in))
-    padded[:n_out] = weights
-    return np.ascontiguousarray(padded.reshape(blocks, BLOCK, n_in).transpose(0, 2, 1)).ravel(), blocks
-
-
-@intrinsic
-def times_row(typing_context, rows, first, count, factor):
-    """rows[first : first + count] = rows[: count] times row `factor`, all (LANES,); in vector types, since LLVM cannot know that the
-    rows of one array do not overlap (measured: 16 instead of 2 ns a lane for 59 rows)."""
-    array = types.Array(types.float64, 1, "C")
-    signature = types.void(array, types.int64, types.int64, types.int64)
-    vector = ir.VectorType(ir.DoubleType(), VECTOR)
-
-    def codegen(context, builder, sig, args):
-        data = context.make_array(sig.args[0])(context, builder, args[0]).data
-        word = ir.IntType(64)
-        lanes = word(LANES)
-
-        def at(index):
-            return builder.bitcast(builder.gep(data, [index]), vector.as_pointer())
-
-        def place(row, part):
-            return builder.add(builder.mul(row, lanes), word(part * VECTOR))
-
-        parts = range(LANES // VECTOR)
-        by = [builder.load(at(place(args[3], p))) for p in parts]
-        for value in by:
-            value.align = 8
-        with cgutils.for_range(builder, args[2]) as row:
-            for p in parts:
-                value = builder.load(at(place(row.index, p)))
-                value.align = 8
-                target = at(place(builder.add(args[1], row.index), p))
-                builder.store(builder.fmul(value, by[p]), target).align = 8
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-_times_row: Any = times_row  # its first argument is supplied by numba
+        for m in range(part):
+            rows[first + m] = rows[_first_stage(model) * LANES + m]
 
 
 @njit(**LEAN)
-def multiply(count, factors, rows):
-    """Append rows 0..count times row `factors[i]`, for every i."""
-    for f in range(len(factors)):
-        _times_row(rows, (f + 1) * count, count, factors[f])
+def raw_features(model, x, start, values):
+    """Rows of the paper's network: 1, state, hub-height wind speed at the step's start."""
+    for j in range(LANES):
+        values[j] = 1.0
+        values[(1 + rows(model)) * LANES + j] = start[j]
+    for m in range(width(model)):
+        values[LANES + m] = x[m]
 
 
-RAW_ROWS = 18  # 1, the 16 states as they are, the wind speed: what the paper's network sees
 IDENTITY, RELU, ISRU = 0, 1, 2  # activations
 
 
 @njit(**LEAN)
-def raw_features(x, start, rows):
-    """Rows of the paper's network: 1, state, hub-height wind speed at the step's start."""
-    for j in range(LANES):
-        rows[j] = 1.0
-        rows[17 * LANES + j] = start[j]
-    for m in range(16 * LANES):
-        rows[LANES + m] = x[m]
-
-
-@njit(**LEAN)
-def activate(values, count, kind):
+def _activate(values, count, kind):
     """Apply an activation to `count` rows and append a row of ones for the next layer's bias."""
     size = count * LANES
     if kind == RELU:
@@ -216,43 +127,60 @@ def activate(values, count, kind):
         values[size + j] = 1.0
 
 
-@njit(**FAST)
-def correction(x, k, stage_rows, h, start, middle, end, network, rows, hidden, out):
-    """out (16, LANES) = linear part of the features plus a network of the features: the learned defect of the step.
+@njit(**LEAN)
+def _add_network(model, values, count, learned, hidden, out):
+    """out += the network of `count` rows."""
+    place, sizes = 0, learned.sizes
+    layers = len(sizes) - 1
+    for layer in range(layers):
+        n_in = count if layer == 0 else sizes[layer] + 1
+        blocks = (sizes[layer + 1] + BLOCK - 1) // BLOCK
+        size = blocks * BLOCK * n_in
+        source = values if layer == 0 else hidden[(layer - 1) % 2]
+        dense_rows(source, learned.net[place : place + size], n_in, sizes[layer + 1], hidden[layer % 2])
+        place += size
+        if layer < layers - 1:
+            _activate(hidden[layer % 2], sizes[layer + 1], learned.activation)
+    last = hidden[(layers - 1) % 2]
+    for m in range(width(model)):
+        out[m] += last[m]
 
-    network = (raw, ratio, history, factors, linear weights, net weights, sizes, activation): the linear part sees all rows, and all
-    rows times each row of `factors`; `history` earlier steps' first stages follow the stages, `rows` must be kept between steps;
-    weights as `pack` orders them, one layer after the other; sizes = outputs of the layers behind a 0; empty where there is no such part.
+
+@njit(**LEAN)
+def _clear(model, out):
+    for m in range(width(model)):
+        out[m] = 0.0
+
+
+def correction(learned, model, x, k, stage_rows, h, start, middle, end, seen, hidden, out):
+    """out = the learned defect of a step from x with the stage slopes k[stage_rows], under wind at its start, middle and end. Stub.
+
+    seen: rows that the map sees, kept from step to step; hidden (2, ..): room for layers; out: room for whole blocks of `dense`.
     """
-    raw, ratio, history, factors, linear, net, sizes, activation = network
-    if raw:
-        raw_features(x, start, rows)
-        count = RAW_ROWS
-    else:
-        remember(len(stage_rows), history, rows)
-        features(x, k, stage_rows, h, ratio, start, middle, end, rows)
-        count = FIXED_ROWS + 8 * (len(stage_rows) + history)
+    raise NotImplementedError("compiled code only")
+
+
+@compiled_for(correction, StageMapData)
+@njit(**INLINE)
+def _stage_map(learned, model, x, k, stage_rows, h, start, middle, end, seen, hidden, out):
+    _remember(model, len(stage_rows), learned.history, seen)
+    features(model, x, k, stage_rows, h, learned.ratio, start, middle, end, seen)
+    count = _first_stage(model) + _stage_part(model) * (len(stage_rows) + learned.history)
     inputs = count
-    if len(factors) > 0:
-        multiply(count, factors, rows)
-        inputs = (1 + len(factors)) * count
-    if len(linear) > 0:
-        _dense(rows, linear, inputs, 2, out)  # type: ignore[call-arg]  # numba passes the typing context
+    if len(learned.factors) > 0:
+        multiply(count, learned.factors, seen)
+        inputs = (1 + len(learned.factors)) * count
+    if len(learned.linear) > 0:
+        dense_rows(seen, learned.linear, inputs, rows(model), out)
     else:
-        for m in range(16 * LANES):
-            out[m] = 0.0
-    if len(net) > 0:
-        place = 0
-        layers = len(sizes) - 1
-        for layer in range(layers):
-            n_in = count if layer == 0 else sizes[layer] + 1
-            blocks = (sizes[layer + 1] + BLOCK - 1) // BLOCK
-            size = blocks * BLOCK * n_in
-            source = rows if layer == 0 else hidden[(layer - 1) % 2]
-            _dense(source, net[place : place + size], n_in, blocks, hidden[layer % 2])  # type: ignore[call-arg]  # numba passes the typing context
-            place += size
-            if layer < layers - 1:
-                activate(hidden[layer % 2], sizes[layer + 1], activation)
-        last = hidden[(layers - 1) % 2]
-        for m in range(16 * LANES):
-            out[m] += last[m]
+        _clear(model, out)
+    if len(learned.net) > 0:
+        _add_network(model, seen, count, learned, hidden, out)
+
+
+@compiled_for(correction, RawNetworkData)
+@njit(**INLINE)
+def _raw_network(learned, model, x, k, stage_rows, h, start, middle, end, seen, hidden, out):
+    raw_features(model, x, start, seen)
+    _clear(model, out)
+    _add_network(model, seen, _raw_rows(model), learned, hidden, out)

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.integrators.block import simulate_block
-from fatigue_runner.integrators.methods import METHODS, Method, method
+from fatigue_runner.integrators.block import make_block, run_block
+from fatigue_runner.integrators.contract import Method
+from fatigue_runner.integrators.methods import METHODS
+from fatigue_runner.integrators.methods import method as find_method
 from fatigue_runner.integrators.pitch import PitchSeries
 from fatigue_runner.naming import integrator_id, integrator_label
 
@@ -35,7 +37,7 @@ class Integrator:
 
     method: str
     step: float
-    corrector: Any = None  # a corrector.Corrector; what is needed of it: `correcting.prepare`
+    corrector: Any = None  # what is needed of it: `protocol.StepCorrector`
     mode: str = ENHANCED
 
     def __post_init__(self) -> None:
@@ -49,7 +51,7 @@ class Integrator:
     @property
     def found(self) -> Method:
         """The method itself."""
-        return method(self.method)
+        return find_method(self.method)
 
     @property
     def corrector_name(self) -> str:
@@ -111,13 +113,36 @@ def simulate(ensemble: Ensemble, integrator: Integrator) -> list[Trajectory]:
 
     The last step ends at or after the duration. Raises InputError for impossible numbers and for a corrector that does not fit.
     """
-    out: list[Any] = [None] * len(ensemble)
-    for chosen in ensemble.groups():
-        part = ensemble.part(chosen)
-        block = simulate_block(
-            part.turbine, integrator.method, integrator.step, part.winds, part.initial, part.duration, part.output_step,
-            pitch=part.pitch, corrector=integrator.corrector, mode=integrator.mode,
-        )  # fmt: skip
-        for i, trajectory in zip(chosen, block, strict=True):
+    e, found = ensemble, integrator.found
+    shape = (len(e), e.turbine.layout.size)
+    initial = np.asarray(e.initial, float)
+    if initial.shape != shape:
+        raise InputError(f"initial must have shape {shape}, one state per wind, got {initial.shape}")
+    block = make_block(
+        e.turbine, found, integrator.step, e.duration, e.output_step, e.pitch, integrator.corrector, integrator.mode
+    )  # fmt: skip
+    out: list[Any] = [None] * len(e)
+    for chosen in e.groups():
+        runs = run_block(block, [e.winds[i] for i in chosen], initial[chosen])
+        for i, trajectory in zip(chosen, runs, strict=True):
             out[i] = trajectory
     return out
+
+
+def warm_up(method: str = "heun") -> None:
+    """Compile the kernels that `method` needs, or load them from the cache, before workers need them."""
+    from fatigue_runner.turbine import load_turbine
+    from fatigue_runner.wind import ConstantWind
+
+    turbine = load_turbine("nrel5mw")
+    initial = np.zeros((1, turbine.layout.size)) + 1e-3
+    simulate(Ensemble(turbine, [ConstantWind(8.0)], initial, 0.02), Integrator(method, 0.01))
+
+
+def simulate_block(
+    turbine: Turbine, method: str, step: float, winds: Sequence[WindSource], initial: Array, duration: float,
+    output_step: float | None = None, pitch: float | PitchSeries = 0.0, corrector: Any = None, mode: str = ENHANCED,
+) -> list[Trajectory]:  # fmt: skip
+    """`simulate` with everything in one call; for callers that do not have the nouns yet."""
+    cases = Ensemble(turbine, winds, initial, duration, output_step, pitch)
+    return simulate(cases, Integrator(method, step, corrector, mode))

@@ -5,38 +5,65 @@ corrector integrates the polynomial through that value and the earlier ones (PEC
 takes the distance of x~ from x into account to first order). Weights: Hochbruck & Ostermann (2011), doi:10.1007/s11075-010-9408-y, and
 Beylkin, Keiser & Vozovoi (1998), doi:10.1006/jcph.1998.6093, for the implicit ones.
 
-Everything is written in the hub's frame that does not turn (multi-blade, Coleman coordinates at the azimuth of the step's start): there an
-isotropic rotor has constant coefficients, and one matrix product makes a predictor or a corrector. A learned correction
-(`corrector.exponential_adams`) is another matrix on the same rows.
+Predictor and corrector are one matrix product each on the rows of a step in multi-blade coordinates (`multi_blade`). A learned
+correction is another matrix on the same rows; guarded (hybrid), both the predictor's and the corrector's learned part are.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from math import factorial
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fatigue_runner.integrators.exponential import linear_part, phi_functions
-
-if TYPE_CHECKING:
-    from fatigue_runner.turbine import Turbine
+from fatigue_runner.compiled import INLINE, LEAN, njit
+from fatigue_runner.integrators import multi_blade
+from fatigue_runner.integrators.choice import compiled_for
+from fatigue_runner.integrators.contract import Aligned, Prepared, Task
+from fatigue_runner.integrators.dense import blocks_of, dense_rows, multiply, pack
+from fatigue_runner.integrators.guard import GuardUnits, guard, guard_units, norm_of
+from fatigue_runner.integrators.multi_blade_rows import (
+    advanced,
+    forget_infinite,
+    nonlinear_part,
+    part_rows,
+    part_size,
+    relative,
+    relative_rows,
+    shifted_slope,
+    sine_cosine,
+    state_rows,
+    wind_rows,
+)
+from fatigue_runner.integrators.protocol import MultiBladeData
+from fatigue_runner.integrators.runge_kutta import Stages, Sum, runge_kutta_arrays, slope_rows
+from fatigue_runner.integrators.signals import Signals, signals_at
+from fatigue_runner.integrators.single_steps import integrate
+from fatigue_runner.integrators.stepper import RING, advance, begin, finish, note, recover
+from fatigue_runner.integrators.stepping import (
+    all_fine,
+    keep,
+    keep_largest_distance,
+    move,
+    note_step,
+    subtract,
+)
+from fatigue_runner.integrators.tableaux import RK4
+from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.model import constant, rhs, rows, wind_signals
 
 Array = NDArray[np.float64]
 
 STARTING = 8  # sub-steps of RK4 in each step before there are enough earlier values
-# rows of what a step sees: 1; 15 relative states; wind at start, middle, end; then earlier nonlinear parts, the newest first; the new one
-STATE_ROW, WIND_ROW, PAST_ROW = 1, 16, 25
-PARTS = 8  # rows of a nonlinear part: accelerations, of the shaft's twist in place of the generator's
-MOST_PAST = 4
+
+first_wind_row = constant(multi_blade.wind_row)
+first_past_row = constant(multi_blade.past_row)
 
 
 @dataclass(frozen=True)
 class ExponentialAdams:
-    """`past` earlier values, this step's included, for the predictor; the corrector has them and the new one."""
+    """`past` earlier values, this step's included, for the corrector, `predictor` for the predictor; the corrector has the new one too."""
 
     name: str
     order: int
@@ -45,17 +72,9 @@ class ExponentialAdams:
     past: int
     evaluations_per_step: int = 1
 
-    @property
-    def family(self) -> str:
-        return "exponential-adams"
-
-    @property
-    def varying_pitch(self) -> bool:
-        return False  # its matrices belong to one pitch
-
-    @property
-    def correctable(self) -> bool:
-        return True
+    family = "exponential-adams"
+    varying_pitch = False
+    correctable = True
 
     def evaluations(self, steps: int) -> int:
         """Of a run of `steps` steps, with the initial slope and the start."""
@@ -65,6 +84,45 @@ class ExponentialAdams:
         """None: what is linear is exact, so that the rest decides; `stability_limit` tries it out."""
         return None
 
+    def matrices(
+        self, turbine: Any, step: float, pitch: float, past: int, damping: float = 0.0
+    ) -> tuple[Array, Array]:
+        """Predictor and corrector on the rows of a step that holds `past` earlier values; see `multi_blade.matrices`."""
+        return multi_blade.matrices(turbine, step, pitch, (self.predictor, self.past), past, damping)
+
+    def prepare(self, task: Task) -> Prepared:
+        """See `contract.Method`."""
+        corrector, size = task.corrector, task.layout.size
+        past = self.past if corrector is None else corrector.past
+        damping = 0.0 if corrector is None else corrector.damping
+        low = pack(multi_blade.linear(task.turbine, task.pitch, damping).low)[0]
+        ratio, start = task.turbine.gearbox_ratio, runge_kutta_arrays(RK4)
+        if corrector is None:
+            ahead, plain = self.matrices(task.turbine, task.step, task.pitch, past)
+            maps = _plain_maps(ahead, plain)
+            units = guard_units((1.0,) * size, (0.0,) * size)
+            tested, limit = Tested(False, units, units, 0.0, 0), np.nan
+        else:
+            corrector.bind(task.turbine, self.name, task.step)
+            maps = corrector.map_data(task.turbine, task.pitch)
+            judge = corrector.guard
+            limit = float(judge.limit)
+            own, before = guard_units(judge.atol, judge.rtol), guard_units(judge.ahead_atol, judge.rtol)
+            tested = Tested(task.mode == "hybrid", before, own, limit, norm_of(judge))
+
+        def arrays(states: Array, aligned: Aligned) -> ExponentialAdamsArrays:
+            room = _room(states, task.layout, past, len(maps.factors), aligned)
+            return ExponentialAdamsArrays(
+                low, ratio, past, start.stages, start.result, STARTING, maps, tested, room
+            )
+
+        def evaluations(steps: int) -> int:
+            # a corrector that looks further back starts longer
+            begun = min(max(steps, self.past - 1), past - 1) - (self.past - 1)
+            return self.evaluations(steps) + begun * 4 * STARTING
+
+        return Prepared(arrays, RING, evaluations, limit if tested.hybrid else np.nan)
+
 
 _SOURCE = (
     "exponential Adams-Bashforth-Moulton, PEC; Hochbruck & Ostermann (2011), doi:10.1007/s11075-010-9408-y"
@@ -73,123 +131,207 @@ ETDABM3 = ExponentialAdams("etdabm3", 3, _SOURCE, 2, 2)
 ETDABM4 = ExponentialAdams("etdabm4", 4, _SOURCE, 3, 3)
 
 
-def base_rows(past: int) -> int:
-    """Rows that a corrector sees with `past` earlier nonlinear parts."""
-    return PAST_ROW + PARTS * (past + 1)
+# --- what the compiled step reads ---
 
 
-def to_multi_blade(rows: int, first: tuple[int, ...]) -> Array:
-    """(rows, rows) from three blades' rows, which begin at each of `first`, to mean, cosine and sine part at azimuth zero."""
-    out = np.eye(rows)
-    half, third = np.sqrt(3) / 2, 1 / 3
-    block = np.array([[third] * 3, [2 * third, -third, -third], [0.0, 2 * third * half, -2 * third * half]])
-    for i in first:
-        out[i : i + 3, i : i + 3] = block
-    return out
+class Tested(NamedTuple):
+    """The hybrid's acceptance test: units of the predictor's and of the corrector's result, limit and norm of both."""
+
+    hybrid: bool
+    ahead_units: GuardUnits
+    units: GuardUnits
+    limit: float
+    norm: int
 
 
-T_STATE, T_RELATIVE, T_PARTS = (
-    to_multi_blade(16, (2, 10)),
-    to_multi_blade(15, (2, 9)),
-    to_multi_blade(8, (2,)),
-)
+class Room(NamedTuple):
+    """ahead, fixed, other, change: states; middle, start: winds; seen: rows of the step; ring: nonlinear parts; the start's own arrays."""
+
+    ahead: Array
+    fixed: Array
+    other: Array
+    change: Array
+    start: Array
+    middle: Array
+    seen: Array
+    ring: Array
+    turned: Array
+    rel: Array
+    product: Array
+    judged: tuple[Array, NDArray[np.bool_]]
+    scaled: Array
+    states: Array
+    k: Array
+    stage: Array
+    wind: Array
 
 
-@dataclass(frozen=True)
-class Linear:
-    """A in relative coordinates (15: deflections, twist, rates, rate of twist): `low` (8, 15) gives the accelerations, that of the
-    twist last; `rates` (16, 15) all of A x. `isotropic`: (16, 16) A of the state's own coordinates."""
-
+class ExponentialAdamsArrays(NamedTuple):
     low: Array
-    rates: Array
-    isotropic: Array
+    ratio: float
+    past: int
+    stages: Stages
+    result: Sum
+    substeps: int
+    maps: MultiBladeData
+    tested: Tested
+    room: Room
 
 
-@lru_cache(maxsize=64)
-def linear(turbine: Turbine, pitch: float, damping: float = 0.0) -> Linear:
-    """The linear part as it looks from every azimuth alike, to rounding: what the average leaves of a coupling is dropped.
-
-    damping [1/s]: added to the generator's. The torque law's line of region 2.5 is 5/s steeper than region 2, and with A of region 2
-    steps above 0.1 s are unstable there; between the two both are stable (measured), and a learned part makes up for the accuracy.
-    """
-    ratio = turbine.parameters["g_ratio"]
-    own = linear_part(turbine, pitch).copy()
-    own[15, 15] -= damping
-    a = T_STATE @ own @ np.linalg.inv(T_STATE)
-    turning = np.zeros(16, bool)
-    turning[[3, 4, 11, 12]] = True
-    a[np.ix_(turning, ~turning)] = 0.0
-    a[np.ix_(~turning, turning)] = 0.0
-    for i in (3, 11):
-        for j in (3, 11):
-            same, cross = (a[i, j] + a[i + 1, j + 1]) / 2, (a[i, j + 1] - a[i + 1, j]) / 2
-            a[i, j] = a[i + 1, j + 1] = same
-            a[i, j + 1], a[i + 1, j] = cross, -cross
-    a = np.linalg.inv(T_STATE) @ a @ T_STATE
-    a[8:, 6] = -ratio * a[8:, 7]
-    rates = np.zeros((16, 15))
-    rates[:, :6], rates[:, 6] = a[:, :6], -ratio * a[:, 7]
-    rates[:, 7:13], rates[:, 13] = a[:, 8:14], a[:, 14] + ratio * a[:, 15]
-    rates[:, 14] = -ratio * a[:, 15]
-    low = rates[8:].copy()
-    low[7] = rates[14] - rates[15] / ratio
-    return Linear(low, rates, a)
+def _plain_maps(ahead: Array, plain: Array) -> MultiBladeData:
+    """Of the method alone."""
+    first, second = pack(ahead)[0], pack(plain)[0]
+    return MultiBladeData(first, first, second, second, np.zeros(0, np.int64))
 
 
-def _parts_to_state(ratio: float) -> Array:
-    """(16, 8): accelerations of the state from a nonlinear part."""
-    out = np.zeros((16, 8))
-    out[8:15, :7] = np.eye(7)
-    out[15, 6:8] = ratio, -ratio
-    return out
+def _room(start: Array, layout: Any, past: int, factors: int, aligned: Aligned) -> Room:
+    width, padded = len(start), 8 * blocks_of(layout.size) * LANES
+    part = multi_blade.parts(layout)
+    inputs = multi_blade.base_rows(layout, past) * (1 + factors)
+    halves = 1 << (layout.size - 1).bit_length()
+    zeros = {
+        "ahead": padded, "fixed": padded, "other": padded, "change": padded,
+        "start": len(layout.wind) * LANES, "middle": len(layout.wind) * LANES,
+        "seen": inputs * LANES, "turned": 2 * LANES, "rel": layout.relative_size * LANES,
+        "product": 8 * blocks_of(part) * LANES, "scaled": halves * LANES, "stage": width,
+        "wind": len(layout.wind) * LANES,
+    }  # fmt: skip
+    return Room(
+        **{name: aligned(np.zeros(size)) for name, size in zeros.items()},
+        ring=aligned(np.zeros((past + 1, part * LANES))),
+        judged=(aligned(np.zeros(LANES)), np.ones(LANES, np.bool_)),
+        states=aligned(np.zeros((3, width))),
+        k=aligned(np.zeros((slope_rows(RK4), width))),
+    )
 
 
-def weights(a: Array, step: float, nodes: list[int]) -> list[Array]:
-    """(16, 16) each: the step's integral of exp((1 - t) h A) g(t), g the polynomial through its values at `nodes` [steps]."""
-    count = len(nodes)
-    phi = phi_functions(a * step, count)
-    powers = np.linalg.inv(np.vander(nodes, count, increasing=True).astype(float))
-    return [sum(powers[k, j] * factorial(k) * step * phi[k + 1] for k in range(count)) for j in range(count)]
+# --- the step ---
 
 
-@lru_cache(maxsize=256)
-def matrices(
-    turbine: Turbine, method: ExponentialAdams, step: float, pitch: float, past: int, damping: float = 0.0
-) -> tuple[Array, Array]:
-    """Predictor (16, rows before the new part) and corrector (16, `base_rows`) on the rows of a step, in multi-blade coordinates."""
-    line = linear(turbine, pitch, damping)
-    spread = _parts_to_state(turbine.parameters["g_ratio"])
-    back = np.linalg.inv(T_RELATIVE), np.linalg.inv(T_PARTS)
-    rows = base_rows(past)
-    state = step * phi_functions(line.isotropic * step, 1)[1] @ line.rates
-
-    def put(nodes: list[int]) -> Array:
-        out = np.zeros((16, rows))
-        out[:, STATE_ROW:WIND_ROW] = T_STATE @ state @ back[0]
-        for node, weight in zip(nodes, weights(line.isotropic, step, nodes), strict=True):
-            first = PAST_ROW + PARTS * (past if node == 1 else -node)
-            out[:, first : first + PARTS] = T_STATE @ weight @ spread @ back[1]
-        return out
-
-    predictor = put([-j for j in range(method.predictor)])[:, : rows - PARTS]
-    return np.ascontiguousarray(predictor), put([1, *(-j for j in range(method.past))])
+@njit(**LEAN)
+def _copy_wind(model, p, out):
+    for m in range(wind_signals(model) * LANES):
+        out[m] = p[m]
 
 
-def loop_data(turbine: Turbine, pitch: float, past: int, damping: float = 0.0) -> tuple[Any, ...]:
-    """`method` of the compiled loop: A of the accelerations, ratio of the gearbox, earlier parts, RK4 and its sub-steps for the start."""
-    from fatigue_runner.integrators.correction import pack
-    from fatigue_runner.integrators.kernel_data import runge_kutta_data
-    from fatigue_runner.integrators.tableaux import RK4
-
-    low = pack(linear(turbine, pitch, damping).low)[0]
-    return low, turbine.parameters["g_ratio"], past, runge_kutta_data(RK4)[:2], STARTING
+@njit(**INLINE)
+def _times_linear(model, method, x):
+    """room.product = linear part of the accelerations at the state x."""
+    room = method.room
+    relative(model, x, 1.0 / method.ratio, room.rel, 0)
+    dense_rows(room.rel, method.low, relative_rows(model), part_size(model), room.product)
 
 
-def network(
-    predictors: tuple[Array, Array], correctors: tuple[Array, Array], factors: tuple[int, ...] = ()
-) -> tuple[Any, ...]:
-    """`network` of the compiled loop: weights of predictor and corrector, those of the plain ones, and the rows that multiply all rows."""
-    from fatigue_runner.integrators.correction import pack
+@compiled_for(begin, ExponentialAdamsArrays)
+@njit(**INLINE)
+def _begin(method, model, h, signals, data, ring):
+    room = method.room
+    _copy_wind(model, signals.p, room.start)
+    _copy_wind(model, signals.p, room.middle)
+    rhs(model, ring.current, signals.p, signals.u, ring.slope, 0, data)
+    keep(model, ring.slope, ring.k, 0)
+    _times_linear(model, method, ring.current)
+    nonlinear_part(model, ring.slope, room.product, 1.0 / method.ratio, room.ring, 0)
 
-    packed = (pack(weights)[0] for weights in (*predictors, *correctors))
-    return (*packed, np.array(factors, dtype=np.int64))
+
+@compiled_for(recover, ExponentialAdamsArrays)
+@njit(**INLINE)
+def _recover(method):
+    forget_infinite(method.room.ring)
+
+
+@njit(**INLINE)
+def _predict(model, method, n, newest, signals, ring):
+    """room.ahead = the predictor's result, guarded in hybrid mode; room.seen = the rows that it sees."""
+    room, maps, tested, past = method.room, method.maps, method.tested, method.past
+    seen, turned, current = room.seen, room.turned, ring.current
+    first, wind, signal_count = first_past_row(model), first_wind_row(model), wind_signals(model)
+    sine_cosine(model, current, turned)
+    state_rows(model, current, turned, 1.0 / method.ratio, seen)
+    wind_rows(model, room.start, seen, wind)
+    wind_rows(model, room.middle, seen, wind + signal_count)
+    wind_rows(model, signals.p, seen, wind + 2 * signal_count)
+    for i in range(past):
+        part_rows(model, room.ring, (newest - i) % (past + 1), turned, seen, first + part_size(model) * i)
+    inputs = first + part_size(model) * past
+    dense_rows(seen, maps.ahead, inputs, rows(model), room.change)
+    if tested.hybrid:
+        # a wrong place of the evaluation would spoil the fallback, too
+        advanced(model, current, room.change, turned, room.fixed)
+        dense_rows(seen, maps.plain_ahead, inputs, rows(model), room.change)
+        advanced(model, current, room.change, turned, room.other)
+        guard(
+            model, room.ahead, room.other, room.fixed, tested.ahead_units, tested.limit, tested.norm, room.scaled, room.judged
+        )  # fmt: skip
+    else:
+        advanced(model, current, room.change, turned, room.ahead)
+
+
+@njit(**INLINE)
+def _correct(model, method, line, ring):
+    """ring.current = the corrector's result, guarded in hybrid mode."""
+    room, maps, tested = method.room, method.maps, method.tested
+    seen, turned, current = room.seen, room.turned, ring.current
+    new_row = first_past_row(model) + part_size(model) * method.past
+    count = new_row + part_size(model)
+    part_rows(model, room.ring, line, turned, seen, new_row)
+    if len(maps.factors) > 0:
+        multiply(count, maps.factors, seen)
+    dense_rows(seen, maps.weights, count * (1 + len(maps.factors)), rows(model), room.change)
+    advanced(model, current, room.change, turned, room.fixed)
+    if tested.hybrid:
+        dense_rows(seen, maps.plain_weights, count, rows(model), room.change)
+        advanced(model, current, room.change, turned, room.other)
+        guard(
+            model, current, room.other, room.fixed, tested.units, tested.limit, tested.norm, room.scaled, room.judged
+        )  # fmt: skip
+    else:
+        move(model, room.fixed, current)
+    keep_largest_distance(model, current, room.ahead, ring.largest)
+
+
+@compiled_for(advance, ExponentialAdamsArrays)
+@njit(**INLINE)
+def _advance(method, model, n, h, now, new, signals, data, ring):
+    room, past = method.room, method.past
+    newest, line = n % (past + 1), (n + 1) % (past + 1)
+    if signals.changing:
+        signals_at(model, (n + 0.5) * h, signals)
+        _copy_wind(model, signals.p, room.middle)
+        signals_at(model, (n + 1) * h, signals)
+    if n < past - 1:
+        small = method.substeps
+        inner = Signals(
+            signals.cell_duration, signals.cells, signals.changing, signals.control, room.wind, signals.u
+        )
+        integrate(
+            model, ring.current, method.stages, method.result, h / small, n * small, small, inner, data,
+            room.states, room.k, room.stage, room.other,
+        )  # fmt: skip
+        move(model, ring.current, room.ahead)
+    else:
+        _predict(model, method, n, newest, signals, ring)
+    rhs(model, room.ahead, signals.p, signals.u, ring.slope, 0, data)
+    _times_linear(model, method, room.ahead)
+    nonlinear_part(model, ring.slope, room.product, 1.0 / method.ratio, room.ring, line)
+    if n >= past - 1:
+        _correct(model, method, line, ring)
+    keep(model, ring.current, ring.states, new)
+    return all_fine(model, ring.current)
+
+
+@compiled_for(finish, ExponentialAdamsArrays)
+@njit(**INLINE)
+def _finish(method, model, n, h, now, new, wanted, signals, data, ring):
+    room = method.room
+    if wanted:
+        subtract(model, ring.current, room.ahead, room.change)
+        _times_linear(model, method, room.change)
+        shifted_slope(model, ring.slope, room.product, method.ratio, ring.k, new)
+    _copy_wind(model, signals.p, room.start)
+
+
+@compiled_for(note, ExponentialAdamsArrays)
+@njit(**INLINE)
+def _note(method, model, ring, out, interval):
+    note_step(model, method.room.judged, ring.largest, ring.current, out, interval)

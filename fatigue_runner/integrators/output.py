@@ -1,7 +1,8 @@
 """Dense output: weights that interpolate positions, velocities and accelerations at step ends to the output times.
 
-Every state is a position or its velocity, so the Hermite polynomial through (q, q', q'') at the two ends of a step has order 5
-for q and its derivative order 4 for q'; through three step ends 8 and 7. The higher one serves the methods above order 4.
+A position and its velocity come in pairs, so the Hermite polynomial through (q, q', q'') at the two ends of a step has order 5
+for q and its derivative order 4 for q'; through three step ends 8 and 7. The higher one serves the methods above order 4. A
+first-order state has its value and slope only: order 3 through two step ends, 5 through three.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import factorial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +18,22 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+class PlanArrays(NamedTuple):
+    """What the compiled loop reads of an `OutputPlan`."""
+
+    step: NDArray[np.int64]
+    exact: NDArray[np.bool_]
+    position: Array
+    velocity: Array
+    first_order: Array
+
+
 @dataclass(frozen=True)
 class OutputPlan:
     """time (n,) [s]; `step` (n,) the step after which each output is known (0: the start); `exact` where it is the step's end.
 
-    position, velocity (n, 9): weights of q, h q', h^2 q'' at the ends n-1, n, n+1 (node by node) for q and for h q'.
+    position, velocity (n, 9): weights of q, h q', h^2 q'' at the ends n-1, n, n+1 (node by node) for q and for h q';
+    first_order (n, 6): of x, h x' for a first-order state x.
     """
 
     time: Array
@@ -28,18 +41,24 @@ class OutputPlan:
     exact: NDArray[np.bool_]
     position: Array
     velocity: Array
+    first_order: Array
+
+    @property
+    def arrays(self) -> PlanArrays:
+        return PlanArrays(self.step, self.exact, self.position, self.velocity, self.first_order)
 
 
 @lru_cache(maxsize=4096)
-def hermite_weights(theta: float, nodes: tuple[float, ...]) -> tuple[Array, Array]:
-    """(3 nodes,) weights for value and derivative at `theta` [steps], from value, slope and curvature at the nodes."""
-    size = 3 * len(nodes)
+def hermite_weights(theta: float, nodes: tuple[float, ...], derivatives: int = 3) -> tuple[Array, Array]:
+    """(derivatives * nodes,) weights for value and derivative at `theta` [steps], from value, slope and curvature at the nodes (or
+    value and slope, with two derivatives)."""
+    size = derivatives * len(nodes)
     rows = np.zeros((size, size))
     for i, x in enumerate(nodes):
-        for derivative in range(3):
+        for derivative in range(derivatives):
             for power in range(derivative, size):
                 scale = factorial(power) / factorial(power - derivative)
-                rows[3 * i + derivative, power] = scale * x ** (power - derivative)
+                rows[derivatives * i + derivative, power] = scale * x ** (power - derivative)
     powers = np.arange(size)
     value = theta**powers
     slope = np.where(powers > 0, powers * theta ** np.maximum(powers - 1, 0), 0.0)
@@ -59,12 +78,13 @@ def plan_output(
     nearest = np.rint(place)
     exact = np.abs(place - nearest) < 1e-6
     number = np.where(exact, nearest, np.ceil(place)).astype(np.int64)
-    position, velocity = np.zeros((len(time), 9)), np.zeros((len(time), 9))
+    position, velocity, first = (np.zeros((len(time), width)) for width in (9, 9, 6))
     three = order > 4 and steps > 1
     if three and np.any((number == 1) & ~exact):
         # the first step's outputs wait for the second step's end, to have three step ends; so its own end must wait, too, and is
         # then the one before the newest: weight 1 on its value and on its slope
-        position[(number == 1) & exact, 3] = velocity[(number == 1) & exact, 4] = 1.0
+        at_end = (number == 1) & exact
+        position[at_end, 3] = velocity[at_end, 4] = first[at_end, 2] = 1.0
         waiting = number == 1
         number[waiting] = 2
     else:
@@ -75,5 +95,7 @@ def plan_output(
         nodes = (-1.0, 0.0, 1.0) if three else (0.0, 1.0)
         q, v = hermite_weights(theta, nodes)
         position[i, 9 - len(q) :], velocity[i, 9 - len(v) :] = q, v
+        x = hermite_weights(theta, nodes, 2)[0]
+        first[i, 6 - len(x) :] = x
     exact &= ~waiting
-    return OutputPlan(time, number, exact, position, velocity)
+    return OutputPlan(time, number, exact, position, velocity, first)

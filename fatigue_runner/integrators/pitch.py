@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.wind.cells import cell_count, evaluate, minimum
-
-if TYPE_CHECKING:
-    from fatigue_runner.turbine import Turbine
 
 Array = NDArray[np.float64]
 
@@ -62,10 +58,10 @@ class PitchSeries:
         """Pitch (n,) [rad] at `time` (n,) [s]."""
         return evaluate(self.time_step, self._coefficients[..., None], np.asarray(time, float))[:, 0]
 
-    def cells(self, turbine: Turbine, duration: float) -> tuple[float, Array]:
+    def cells(self, pitch_range: tuple[float, float], duration: float) -> tuple[float, Array]:
         """Cell duration [s] and cubics (n, 4) of a run of `duration` [s].
 
-        Raises InputError where the series is shorter, or leaves the turbine's aerodynamic tables.
+        Raises InputError where the series is shorter, or leaves `pitch_range` [rad], that of the turbine's tables.
         """
         count = cell_count(duration, self.time_step)
         if count > len(self._coefficients):
@@ -74,7 +70,7 @@ class PitchSeries:
                 f"pitch series: it ends at {end:g} s, the run at {duration:g} s; give a longer series"
             )
         cubics = self._coefficients[:count]
-        low, high = np.degrees(turbine.pitch_range)
+        low, high = np.degrees(pitch_range)
         lowest = minimum(self.time_step, cubics)
         highest = minimum(self.time_step, -cubics)
         for angle, at in (lowest, (-highest[0], highest[1])):

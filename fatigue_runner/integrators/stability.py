@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.integrators.ensemble import Ensemble, Integrator, simulate
 from fatigue_runner.integrators.methods import method as find_method
 
 if TYPE_CHECKING:
@@ -51,22 +52,22 @@ def stability_limit(turbine: Turbine, method: str, wind: float | None = None, pi
 
 def _tried_limit(turbine: Turbine, method: str, wind: float, pitch: float) -> float:
     """Largest step of a fine scale below which small deviations from the steady rotation die out in simulated runs."""
-    from fatigue_runner.integrators.block import simulate_block
     from fatigue_runner.wind import ConstantWind
 
+    layout = turbine.layout
+    still, rates = layout.deflections, slice(layout.freedoms, layout.freedoms + layout.deflections)
     base = turbine.operating_point(wind, pitch=pitch)
     rng = np.random.Generator(np.random.PCG64(0))
     start = np.repeat(base[None], TRIED, axis=0)
     # deflections and their velocities; the rotation itself is neutral
-    start[1:, :6] += 1e-3 * rng.standard_normal((TRIED - 1, 6))
+    start[1:, :still] += 1e-3 * rng.standard_normal((TRIED - 1, still))
     found = 0.0
     for h in np.geomspace(0.1, LARGEST, 24):
-        runs = simulate_block(
-            turbine, method, float(h), [ConstantWind(wind)] * TRIED, start, 200 * float(h), pitch=pitch
-        )
+        cases = Ensemble(turbine, [ConstantWind(wind)] * TRIED, start, 200 * float(h), pitch=pitch)
+        runs = simulate(cases, Integrator(method, float(h)))
         if any(r.diverged_at is not None for r in runs):
             break
-        off = np.array([r.state[:, 8:14] - runs[0].state[:, 8:14] for r in runs[1:]])
+        off = np.array([r.state[:, rates] - runs[0].state[:, rates] for r in runs[1:]])
         early, late = np.abs(off[:, 10:50]).max(), np.abs(off[:, -40:]).max()
         if late > early:
             break

@@ -1,140 +1,28 @@
-"""Butcher tableaux of the explicit Runge-Kutta methods: data, checked when made. A new method is one more entry here."""
+"""The Runge-Kutta methods as data. A new one is one more entry here, found by itself."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from fractions import Fraction
-from functools import lru_cache
+from functools import cache
 
-import numpy as np
-from numpy.typing import NDArray
-
-Number = Fraction | float
-Array = NDArray[np.float64]
-
-
-def F(text: str) -> list[Number]:
-    """Exact row: '1/4 1/4' -> fractions."""
-    return [Fraction(word) for word in text.split()]
-
-
-@dataclass(frozen=True)
-class ButcherTableau:
-    """An explicit Runge-Kutta method.
-
-    A: rows 2..s, row i with at most i - 1 entries; b (s,) weights of the result, of `order`; b_hat (s,) weights of the embedded
-    result, of `embedded_order`, or None. c follows from A. Exact rationals where the source gives them.
-    Raises ValueError where the weights do not add up to 1 or a row is too long.
-    """
-
-    name: str
-    order: int
-    A: tuple[tuple[Number, ...], ...]
-    b: tuple[Number, ...]
-    source: str
-    b_hat: tuple[Number, ...] | None = None
-    embedded_order: int = 0
-
-    def __post_init__(self) -> None:
-        for row, weights in enumerate(self.A, start=1):
-            if len(weights) > row:
-                raise ValueError(
-                    f"{self.name}: row {row + 1} of A has {len(weights)} entries, an explicit method has {row}"
-                )
-        if len(self.A) != self.stages - 1:
-            raise ValueError(f"{self.name}: {len(self.A)} rows of A for {self.stages} stages")
-        for label, total in (("b", self.b), ("b_hat", self.b_hat)):
-            if total is not None and abs(float(sum(total)) - 1) > 1e-14:
-                raise ValueError(f"{self.name}: {label} adds up to {float(sum(total))}, not 1")
-
-    @property
-    def stages(self) -> int:
-        return len(self.b)
-
-    @property
-    def first_same_as_last(self) -> bool:
-        """Whether the last stage is the first one of the next step, so that it costs nothing."""
-        return self.stages > 1 and self.b[-1] == 0 and tuple(self.A[-1]) == tuple(self.b[: len(self.A[-1])])
-
-    @property
-    def family(self) -> str:
-        return "runge-kutta"
-
-    @property
-    def varying_pitch(self) -> bool:
-        return True
-
-    @property
-    def correctable(self) -> bool:
-        return True
-
-    @property
-    def evaluations_per_step(self) -> int:
-        return self.stages - self.first_same_as_last
-
-    def evaluations(self, steps: int) -> int:
-        """Of a run of `steps` steps, with the initial slope."""
-        return 1 + steps * self.evaluations_per_step
-
-    @property
-    def c(self) -> tuple[Number, ...]:
-        """Stage times in steps."""
-        return (Fraction(0), *(sum(row, start=Fraction(0)) for row in self.A))
-
-    def arrays(self) -> tuple[Array, Array, Array, Array]:
-        """A (s, s), b (s,), error weights b - b_hat (s,) (zeros without an embedded method), c (s,)."""
-        return _arrays(self)
-
-    def stability_function(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """R(z) = 1 + z b^T (1 + z A 1 + z^2 A^2 1 + ...)."""
-        a, b, _, _ = self.arrays()
-        total, power = np.ones_like(z, dtype=complex), np.ones(self.stages)
-        factor = z.astype(complex)
-        for _ in range(self.stages):
-            total = total + factor * (b @ power)
-            power, factor = a @ power, factor * z
-        return total
-
-    def growth(self, z: NDArray[np.complex128]) -> Array:
-        """|R(z)|"""
-        return np.abs(self.stability_function(z))
-
-
-@lru_cache(maxsize=64)
-def _arrays(tableau: ButcherTableau) -> tuple[Array, Array, Array, Array]:
-    s = tableau.stages
-    a = np.zeros((s, s))
-    for i, row in enumerate(tableau.A, start=1):
-        a[i, : len(row)] = [float(x) for x in row]
-    b = np.array([float(x) for x in tableau.b])
-    hat = b if tableau.b_hat is None else np.array([float(x) for x in tableau.b_hat])
-    return a, b, b - hat, np.array([float(x) for x in tableau.c])
-
-
-def tableau(
-    name: str, order: int, rows: list[str], b: str, source: str, b_hat: str = "", embedded_order: int = 0
-) -> ButcherTableau:
-    """Tableau from rows of rationals."""
-    return ButcherTableau(
-        name,
-        order,
-        tuple(tuple(F(r)) for r in rows),
-        tuple(F(b)),
-        source,
-        tuple(F(b_hat)) or None,
-        embedded_order,
-    )
-
+from fatigue_runner.integrators.butcher import ButcherTableau, tableau
 
 EULER = tableau("euler", 1, [], "1", "Euler (1768)")
-HEUN = tableau(
-    "heun", 2, ["1"], "1/2 1/2", "Heun (1900); arXiv:2504.05493, example 1", b_hat="1 0", embedded_order=1
-)
-RK3 = tableau(
+_RK3 = tableau(
     "rk3", 3, ["1", "1/4 1/4"], "1/6 1/6 2/3",
     "Shu & Osher (1988), doi:10.1016/0021-9991(88)90177-5; arXiv:2504.05493, example 3: shares Heun's two stages",
     b_hat="1/2 1/2 0", embedded_order=2,
 )  # fmt: skip
+HEUN = tableau(
+    "heun",
+    2,
+    ["1"],
+    "1/2 1/2",
+    "Heun (1900); arXiv:2504.05493, example 1",
+    b_hat="1 0",
+    embedded_order=1,
+    shared_by=_RK3,
+)
+RK3 = _RK3
 # Heun over the step and over its two halves, extrapolated to order 3; the first evaluation is shared.
 HEUN_RICHARDSON = tableau(
     "heun-richardson", 3, ["1", "1/2", "1/4 0 1/4", "1/4 0 1/4 1/2"], "1/6 -1/6 1/3 1/3 1/3",
@@ -159,16 +47,6 @@ DP5 = tableau(
     "35/384 0 500/1113 125/192 -2187/6784 11/84 0", "Dormand & Prince (1980), doi:10.1016/0771-050X(80)90013-3",
     b_hat="5179/57600 0 7571/16695 393/640 -92097/339200 187/2100 1/40", embedded_order=4,
 )  # fmt: skip
-RK7 = tableau(
-    "rk7", 7,
-    ["2/27", "1/36 1/12", "1/24 0 1/8", "5/12 0 -25/16 25/16", "1/20 0 0 1/4 1/5",
-     "-25/108 0 0 125/108 -65/27 125/54",
-     "31/300 0 0 0 61/225 -2/9 13/900", "2 0 0 -53/6 704/45 -107/9 67/90 3",
-     "-91/108 0 0 23/108 -976/135 311/54 -19/60 17/6 -1/12",
-     "2383/4100 0 0 -341/164 4496/1025 -301/82 2133/4100 45/82 45/164 18/41"],
-    "41/840 0 0 0 0 34/105 9/35 9/35 9/280 9/280 41/840",
-    "Fehlberg (1968), NASA TR R-287, RK7(8): the 11 stages of its 7th-order result",
-)  # fmt: skip
 TSIT5 = ButcherTableau(
     "tsit5", 5,
     ((0.161,), (-0.008480655492356989, 0.335480655492357), (2.8971530571054935, -6.359448489975075, 4.3622954328695815),
@@ -181,8 +59,19 @@ TSIT5 = ButcherTableau(
            1.866628418170587, 1 / 66),
     embedded_order=4,
 )  # fmt: skip
+RK7 = tableau(
+    "rk7", 7,
+    ["2/27", "1/36 1/12", "1/24 0 1/8", "5/12 0 -25/16 25/16", "1/20 0 0 1/4 1/5",
+     "-25/108 0 0 125/108 -65/27 125/54",
+     "31/300 0 0 0 61/225 -2/9 13/900", "2 0 0 -53/6 704/45 -107/9 67/90 3",
+     "-91/108 0 0 23/108 -976/135 311/54 -19/60 17/6 -1/12",
+     "2383/4100 0 0 -341/164 4496/1025 -301/82 2133/4100 45/82 45/164 18/41"],
+    "41/840 0 0 0 0 34/105 9/35 9/35 9/280 9/280 41/840",
+    "Fehlberg (1968), NASA TR R-287, RK7(8): the 11 stages of its 7th-order result",
+)  # fmt: skip
 
 
+@cache
 def dop853() -> ButcherTableau:
     """Dormand & Prince's 8th-order method; the 12-stage coefficients are those of SciPy's DOP853."""
     from scipy.integrate import DOP853

@@ -8,17 +8,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
 from fatigue_runner.compiled import LEAN  # noqa: F401  # the cache is keyed by all files that name this module
-from fatigue_runner.turbine.generated.kernel import LANES
+from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.model import ModelType
 
 VECTOR = 8  # doubles; LLVM splits a vector where the machine's are shorter
 TOGETHER = 8  # vectors whose sums stay in registers while the terms pass by
-WIDTH = 16 * LANES
-AZIMUTHS = (6, 7)  # rows of the state that may grow large
 
 _WORD, _INDEX = ir.IntType(64), ir.IntType(32)
 _SUM, _BITS = ir.VectorType(ir.DoubleType(), VECTOR), ir.VectorType(_WORD, VECTOR)
@@ -27,25 +27,35 @@ _MAGNITUDE = 2**63 - 1
 _FLAGS = ("contract", "nsz")
 
 
-def stage_sum(bounds: tuple[int, int] | None) -> Callable[..., Any]:
-    """An intrinsic (states, now, k, rows, weights, line, count, h, out, new):
+# No state of a turbine comes near these values; beyond them a case has diverged. Azimuths grow without limit.
+STATE_BOUND, AZIMUTH_BOUND = 1e4, 1e9
+# magnitudes of doubles are ordered as these, infinity and NaN above every number
+STATE_BITS, AZIMUTH_BITS = (int(np.float64(bound).view(np.int64)) for bound in (STATE_BOUND, AZIMUTH_BOUND))
 
-    out = states[now] + h sum_j weights[line, j] k[rows[line, j]], j < count, count at least 1. With `bounds`, the bits of the largest
-    magnitude of a state and of an azimuth, it is stored in states[new] as well, and the result says whether all of it is within.
+
+def stage_sum(checked: bool) -> Callable[..., Any]:
+    """An intrinsic (model, states, now, k, rows, weights, line, count, h, out, new):
+
+    out = states[now] + h sum_j weights[line, j] k[rows[line, j]], j < count, count at least 1. Where `checked` it is stored in
+    states[new] as well, and the result says whether all of it is within the bounds.
     """
     table, integers = types.Array(types.float64, 2, "C"), types.Array(types.int64, 2, "C")
     flat = types.Array(types.float64, 1, "C")
-    signature = types.boolean(
-        table, types.int64, table, integers, table, types.int64, types.int64, types.float64, flat, types.int64
-    )
 
-    def summed(typing_context, states, now, k, rows, weights, line, count, h, out, new):
+    def summed(typing_context, model, states, now, k, rows, weights, line, count, h, out, new):
+        if not isinstance(model, ModelType):
+            return None
+        signature = types.boolean(
+            model, table, types.int64, table, integers, table, types.int64, types.int64, types.float64, flat, types.int64
+        )  # fmt: skip
+        layout = model.model.layout
+
         def codegen(context, builder, sig, args):
             arrays = [
                 context.make_array(t)(context, builder, a) if isinstance(t, types.Array) else a
                 for t, a in zip(sig.args, args, strict=True)
             ]
-            return _Sum(builder, *arrays).run(bounds)
+            return _Sum(builder, layout, *arrays[1:]).run(checked)
 
         return signature, codegen
 
@@ -53,27 +63,29 @@ def stage_sum(bounds: tuple[int, int] | None) -> Callable[..., Any]:
 
 
 class _Sum:
-    def __init__(self, builder, states, now, k, rows, weights, line, count, h, out, new) -> None:
+    def __init__(self, builder, layout, states, now, k, rows, weights, line, count, h, out, new) -> None:
         b = self.builder = builder
+        self.width, self.azimuths = layout.size * LANES, (layout.rotor, layout.generator)
         self.k, self.count, self.h, self.out = k.data, count, h, out.data
-        self.old = b.gep(states.data, [b.mul(now, _WORD(WIDTH))])
-        self.new = b.gep(states.data, [b.mul(new, _WORD(WIDTH))])
+        self.old = b.gep(states.data, [b.mul(now, _WORD(self.width))])
+        self.new = b.gep(states.data, [b.mul(new, _WORD(self.width))])
         first = [b.mul(line, b.extract_value(array.shape, 1)) for array in (rows, weights)]
         self.rows, self.weights = b.gep(rows.data, [first[0]]), b.gep(weights.data, [first[1]])
 
-    def run(self, bounds: tuple[int, int] | None) -> Any:
+    def run(self, checked: bool) -> Any:
         b, outside = self.builder, ir.Constant(ir.VectorType(ir.IntType(1), VECTOR), [0] * VECTOR)
-        for block in range(0, WIDTH, TOGETHER * VECTOR):
-            places = [block + i * VECTOR for i in range(TOGETHER)]
+        block_size = TOGETHER * VECTOR
+        for block in range(0, self.width, block_size):
+            places = list(range(block, min(block + block_size, self.width), VECTOR))
             sums = self.sums(places)
             for place, total in zip(places, sums, strict=True):
                 value = b.fadd(self.load(self.old, place), b.load(total), flags=_FLAGS)
                 self.store(value, self.out, place)
-                if bounds is not None:
+                if checked:
                     self.store(value, self.new, place)
-                    bound = bounds[place // LANES in AZIMUTHS]
+                    bound = AZIMUTH_BITS if place // LANES in self.azimuths else STATE_BITS
                     outside = b.or_(outside, self.beyond(value, bound))
-        if bounds is None:
+        if not checked:
             return ir.Constant(ir.IntType(1), 1)
         return b.icmp_unsigned("==", b.bitcast(outside, ir.IntType(VECTOR)), ir.IntType(VECTOR)(0))
 
@@ -89,7 +101,7 @@ class _Sum:
 
     def products(self, term: Any, places: list[int]) -> list[Any]:
         b = self.builder
-        row = b.gep(self.k, [b.mul(b.load(b.gep(self.rows, [term])), _WORD(WIDTH))])
+        row = b.gep(self.k, [b.mul(b.load(b.gep(self.rows, [term])), _WORD(self.width))])
         weight = b.fmul(self.h, b.load(b.gep(self.weights, [term])))
         single = b.insert_element(ir.Constant(_SUM, ir.Undefined), weight, _INDEX(0))
         mask = ir.Constant(ir.VectorType(_INDEX, VECTOR), [0] * VECTOR)
@@ -97,10 +109,10 @@ class _Sum:
         return [b.fmul(splat, self.load(row, place), flags=_FLAGS) for place in places]
 
     def beyond(self, value: Any, bound: int) -> Any:
-        """Compared as integers: magnitudes are ordered as their bits, infinity and NaN above every number."""
+        """Whether a magnitude is beyond, compared as integers."""
         b = self.builder
-        bits = b.and_(b.bitcast(value, _BITS), ir.Constant(_BITS, [_MAGNITUDE] * VECTOR))
-        return b.icmp_unsigned(">=", bits, ir.Constant(_BITS, [bound] * VECTOR))
+        magnitude = b.and_(b.bitcast(value, _BITS), ir.Constant(_BITS, [_MAGNITUDE] * VECTOR))
+        return b.icmp_unsigned(">=", magnitude, ir.Constant(_BITS, [bound] * VECTOR))
 
     def load(self, base: Any, place: int) -> Any:
         value = self.builder.load(self.pointer(base, place))

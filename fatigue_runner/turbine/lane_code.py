@@ -19,6 +19,7 @@ from numba.extending import intrinsic
 
 from fatigue_runner.compiled import FAST
 
+LANES = 16  # cases that advance together
 VECTOR = 8  # doubles; LLVM splits a vector where the machine's are shorter
 HEADER = 8  # of the tables: first value, cells per unit, padding to a cache line
 

@@ -1,45 +1,49 @@
-"""Arrays in and out of the lane kernels: padding to whole groups of LANES."""
+"""Arrays in and out of the lane kernels: what a kernel reads of a turbine, and padding to whole groups of LANES."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.compiled import njit
-from fatigue_runner.turbine.generated import kernel
-from fatigue_runner.turbine.generated.kernel import LANES
-from fatigue_runner.turbine.model import loads, rhs
-
-if TYPE_CHECKING:
-    from fatigue_runner.turbine.turbine import KernelData
+from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.model import KernelArrays, Model, loads, rhs
 
 Array = NDArray[np.float64]
 
 
-@njit(nogil=True)
-def _evaluate(x, wind, tables, cells, constants, scratch, row, clamped, out):
-    for group in range(x.shape[0]):
-        rhs(x[group], wind[group], out[group], 0, tables, cells, constants, scratch, row, clamped)
+@dataclass(frozen=True)
+class KernelData:
+    """What the kernels of `model` read for one turbine: constants, and the cells of the equations' and of all tables."""
+
+    model: Model
+    constants: Array
+    tables: Array
+    load_tables: Array
+    cells: int
+
+    def arrays(self, clamped: NDArray[np.int64]) -> KernelArrays:
+        """For `model.rhs`; clamped (LANES,) counts look-ups outside the tables."""
+        return KernelArrays(self.tables, self.cells, self.constants, clamped)
+
+    def load_arrays(self, clamped: NDArray[np.int64]) -> KernelArrays:
+        """For `model.loads`."""
+        return KernelArrays(self.load_tables, self.cells, self.constants, clamped)
 
 
 @njit(nogil=True)
-def _load_groups(x, wind, derivative, tables, cells, constants, scratch, row, clamped, out):
+def _evaluate(model, x, wind, control, data, out):
     for group in range(x.shape[0]):
-        loads(
-            x[group],
-            wind[group],
-            derivative[group],
-            out[group],
-            0,
-            tables,
-            cells,
-            constants,
-            scratch,
-            row,
-            clamped,
-        )
+        rhs(model, x[group], wind[group], control[group], out[group], 0, data)
+
+
+@njit(nogil=True)
+def _load_groups(model, x, wind, control, derivative, data, out):
+    for group in range(x.shape[0]):
+        loads(model, x[group], wind[group], control[group], derivative[group], out[group], 0, data)
 
 
 def to_groups(columns: Array) -> Array:
@@ -57,31 +61,44 @@ def from_groups(groups: Array, k: int, n: int) -> Array:
     return groups.reshape(len(groups), k, LANES).transpose(1, 0, 2).reshape(k, -1)[:, :n]
 
 
-def work_space() -> tuple[Array, Array, NDArray[np.int64]]:
-    """scratch, row (not used any more) and clamped-look-up counters of one kernel call."""
-    return np.zeros(LANES), np.zeros(LANES), np.zeros(LANES, np.int64)
+def aligned(values: NDArray[Any]) -> NDArray[Any]:
+    """A copy that begins on a cache line: loads of whole vectors across two lines cost 5 to 10 % of a step (measured)."""
+    room = np.empty(values.nbytes + 64, np.uint8)
+    begin = -room.ctypes.data % 64
+    out = room[begin : begin + values.nbytes].view(values.dtype).reshape(values.shape)
+    out[...] = values
+    return out
 
 
-def evaluate(data: KernelData, columns: Array, wind: Array) -> tuple[Array, int]:
-    """State derivatives (16, n) of states (16, n) under wind (3, n), and the number of clamped table look-ups.
+def counters() -> NDArray[np.int64]:
+    """(LANES,) of look-ups outside the tables."""
+    return np.zeros(LANES, np.int64)
 
-    With the data of a varying pitch, wind is (4, n), the pitch [rad] last.
-    """
+
+def _controls(control: Array | None, n: int) -> Array:
+    return np.zeros((0, n)) if control is None else control
+
+
+def evaluate(
+    data: KernelData, columns: Array, wind: Array, control: Array | None = None
+) -> tuple[Array, int]:
+    """State derivatives (k, n) of states (k, n) under wind and control signals (m, n), and the number of clamped table look-ups."""
     n = columns.shape[1]
-    x, p = to_groups(columns), to_groups(wind)
-    out = np.empty_like(x)
-    scratch, row, clamped = work_space()
-    _evaluate(x, p, data.tables, data.cells, data.constants, scratch, row, clamped, out)
-    return from_groups(out, 16, n), int(clamped.sum())
+    x, p, u = to_groups(columns), to_groups(wind), to_groups(_controls(control, n))
+    out, clamped = np.empty_like(x), counters()
+    _evaluate(data.model, x, p, u, data.arrays(clamped), out)
+    return from_groups(out, len(columns), n), int(clamped.sum())
 
 
-def load_channels(data: KernelData, state: Array, wind: Array) -> dict[str, Array]:
-    """Load channels {name: (n,)} of states (n, 16) under wind (n, 3), or (n, 4) with the data of a varying pitch."""
-    n = len(state)
+def load_channels(
+    data: KernelData, state: Array, wind: Array, control: Array | None = None
+) -> dict[str, Array]:
+    """Load channels {name: (n,)} of states (n, k) under wind and control signals (n, m)."""
+    names, n = data.model.generated.LOADS, len(state)
     x, p = to_groups(np.ascontiguousarray(state.T)), to_groups(np.ascontiguousarray(wind.T))
-    derivative = np.empty_like(x)
-    out = np.empty((len(x), len(kernel.LOADS) * LANES))
-    scratch, row, clamped = work_space()
-    _evaluate(x, p, data.tables, data.cells, data.constants, scratch, row, clamped, derivative)
-    _load_groups(x, p, derivative, data.load_tables, data.cells, data.constants, scratch, row, clamped, out)
-    return dict(zip(kernel.LOADS, np.ascontiguousarray(from_groups(out, len(kernel.LOADS), n)), strict=True))
+    u = to_groups(np.ascontiguousarray(_controls(None if control is None else control.T, n)))
+    derivative, clamped = np.empty_like(x), counters()
+    out = np.empty((len(x), len(names) * LANES))
+    _evaluate(data.model, x, p, u, data.arrays(clamped), derivative)
+    _load_groups(data.model, x, p, u, derivative, data.load_arrays(clamped), out)
+    return dict(zip(names, np.ascontiguousarray(from_groups(out, len(names), n)), strict=True))

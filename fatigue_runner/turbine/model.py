@@ -1,70 +1,161 @@
-"""The right-hand side for compiled loops: at a fixed pitch or with the pitch as a fourth signal, told apart by the type of the tables.
+"""A set of compiled equations and how compiled code is told which one it runs: by the type of a token.
 
-`KernelData.tables` is flat at a fixed pitch and (1, n) with a varying one, so that a loop is compiled for what it is given and the other
-kernel is not even loaded.
+A `Model` is the layout of a state with the generated module that holds its kernels. Given to compiled code it has a numba type of
+its own, so that a loop is compiled for the widths and the kernel of that model, and every one of them is a constant there.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
 
-from numba.extending import overload
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.core.datamodel import models
+from numba.extending import NativeValue, intrinsic, overload, register_model, typeof_impl, unbox
+from numpy.typing import NDArray
 
 from fatigue_runner.compiled import INLINE, njit
+from fatigue_runner.layout import PITCH, T2B1I1CG, Layout
+from fatigue_runner.turbine.generated import kernel, pitched
+from fatigue_runner.turbine.lane_code import LANES
+
+Array = NDArray[np.float64]
 
 
-def _kernel(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
+@dataclass(frozen=True)
+class Model:
+    """name: of the equations; generated: the module with `rhs`, `loads`, `constants`, `TABLES`, ...; layout: its states and signals."""
+
+    name: str
+    generated: ModuleType
+    layout: Layout
+
+    def __post_init__(self) -> None:
+        _KNOWN[self.key] = self
+
+    @cached_property
+    def key(self) -> str:
+        """Name of the numba type: two models with other equations or another layout never share compiled code."""
+        source = Path(str(self.generated.__file__)).read_bytes()
+        digest = hashlib.sha256(source + repr(self.layout).encode()).hexdigest()
+        return f"{self.name}-{digest[:16]}"
+
+
+_KNOWN: dict[str, Model] = {}
+
+
+class KernelArrays(NamedTuple):
+    """What a kernel reads of a turbine, and the (LANES,) counters of look-ups outside its tables."""
+
+    tables: Array
+    cells: int
+    constants: Array
+    clamped: NDArray[np.int64]
+
+
+class ModelType(types.Opaque):
+    """The numba type of one model; `key` finds it again where compiled code is loaded from the cache."""
+
+    def __init__(self, key: str) -> None:
+        self.model_key = key
+        super().__init__(name=f"Model({key})")
+
+    @property
+    def model(self) -> Model:
+        return _KNOWN[self.model_key]
+
+
+register_model(ModelType)(models.OpaqueModel)
+
+
+@typeof_impl.register(Model)
+def _typeof_model(model: Model, _context: Any) -> ModelType:
+    return ModelType(model.key)
+
+
+def _unbox_model(_type: ModelType, _value: Any, context: Any) -> Any:
+    return NativeValue(context.context.get_dummy_value())
+
+
+unbox(ModelType)(_unbox_model)
+
+
+def constant(of: Callable[[Layout], int]) -> Any:
+    """An intrinsic (model) -> number of its layout, a constant in compiled code."""
+
+    def typed(typing_context: Any, model: Any) -> Any:
+        if not isinstance(model, ModelType):
+            return None
+        value = int(of(model.model.layout))
+
+        def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return ir.Constant(ir.IntType(64), value)
+
+        return types.int64(model), codegen
+
+    return intrinsic(typed)
+
+
+width = constant(lambda layout: layout.size * LANES)  # numbers in the state of a group of lanes
+rows = constant(lambda layout: layout.size)
+padded_rows = constant(
+    lambda layout: 1 << (layout.size - 1).bit_length()
+)  # the next power of two, for reductions by halves
+freedoms = constant(lambda layout: layout.freedoms)
+rotor = constant(lambda layout: layout.rotor)
+first_order = constant(lambda layout: len(layout.first_order))
+wind_signals = constant(lambda layout: len(layout.wind))
+control_signals = constant(lambda layout: len(layout.control))
+
+
+def _rhs(model, x, wind, control, out, start, data):
     raise NotImplementedError("compiled code only")
 
 
-@overload(_kernel, inline="always")
-def _kernel_by_type(x, wind, out, start, tables, cells, constants, scratch, row, clamped) -> Any:
-    if tables.ndim == 1:
-        from fatigue_runner.turbine.generated.kernel import rhs
+@overload(_rhs, inline="always")
+def _rhs_of_model(model, x, wind, control, out, start, data):
+    kernel = model.model.generated.rhs
 
-        def fixed(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
-            rhs(x, wind, out, start, tables, cells, constants, scratch, row, clamped)
+    def call(model, x, wind, control, out, start, data):
+        kernel(x, wind, control, out, start, data.tables, data.cells, data.constants, data.clamped)
 
-        return fixed
-    from fatigue_runner.turbine.generated.pitched import rhs as pitched_rhs
-
-    def varying(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
-        pitched_rhs(x, wind, out, start, tables.reshape(tables.size), cells, constants, scratch, row, clamped)
-
-    return varying
+    return call
 
 
 @njit(**INLINE)
-def rhs(x, wind, out, start, tables, cells, constants, scratch, row, clamped):
-    """out[start:] = state derivatives of LANES states x (16, LANES) under wind (3 or 4, LANES), all flat; the last signal is the pitch."""
-    _kernel(x, wind, out, start, tables, cells, constants, scratch, row, clamped)
+def rhs(model, x, wind, control, out, start, data):
+    """out[start:] = state derivatives of LANES states x under wind and control signals, all flat [row][LANES]; data: `KernelArrays`."""
+    _rhs(model, x, wind, control, out, start, data)
 
 
-def _load_kernel(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped):
+def _loads(model, x, wind, control, derivative, out, start, data):
     raise NotImplementedError("compiled code only")
 
 
-@overload(_load_kernel, inline="always")
-def _load_kernel_by_type(
-    x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped
-) -> Any:
-    if tables.ndim == 1:
-        from fatigue_runner.turbine.generated.kernel import loads as fixed_loads
+@overload(_loads, inline="always")
+def _loads_of_model(model, x, wind, control, derivative, out, start, data):
+    kernel = model.model.generated.loads
 
-        def fixed(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped):
-            fixed_loads(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped)
+    def call(model, x, wind, control, derivative, out, start, data):
+        kernel(
+            x, wind, control, derivative, out, start, data.tables, data.cells, data.constants, data.clamped
+        )
 
-        return fixed
-    from fatigue_runner.turbine.generated.pitched import loads as pitched_loads
-
-    def varying(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped):
-        flat = tables.reshape(tables.size)
-        pitched_loads(x, wind, derivative, out, start, flat, cells, constants, scratch, row, clamped)
-
-    return varying
+    return call
 
 
 @njit(**INLINE)
-def loads(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped):
+def loads(model, x, wind, control, derivative, out, start, data):
     """out[start:] = load channels (k, LANES) of states with their derivatives; else as `rhs`."""
-    _load_kernel(x, wind, derivative, out, start, tables, cells, constants, scratch, row, clamped)
+    _loads(model, x, wind, control, derivative, out, start, data)
+
+
+FIXED_PITCH = Model("fixed-pitch", kernel, T2B1I1CG)
+VARYING_PITCH = Model("varying-pitch", pitched, T2B1I1CG.extended(control=(PITCH,)))

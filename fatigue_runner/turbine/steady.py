@@ -2,36 +2,62 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError
-
-if TYPE_CHECKING:
-    from fatigue_runner.turbine.turbine import Turbine
+from fatigue_runner.layout import T2B1I1CG, Layout
 
 Array = NDArray[np.float64]
 
+
+class Equations(Protocol):
+    """What is balanced and linearised here: a `Turbine`, or whatever has its right-hand side."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def parameters(self) -> Mapping[str, float]: ...
+
+    @property
+    def layout(self) -> Layout: ...
+
+    def rhs(
+        self, state: Any, wind: Any, vertical_shear: Any = ..., horizontal_shear: Any = ..., pitch: Any = ...
+    ) -> Array: ...
+
+
 AZIMUTHS = 24  # of one revolution; three blades and up to the second harmonic repeat well within them
+
+
+# rows of T2B1i1cG by what they are here
+_FREEDOMS, _SIZE = T2B1I1CG.freedoms, T2B1I1CG.size
+_FLAP = T2B1I1CG.blade_sets[0]
+_FLAPS, _FLAP_RATES = slice(_FLAP, _FLAP + 3), slice(_FREEDOMS + _FLAP, _FREEDOMS + _FLAP + 3)
+_EDGE = T2B1I1CG.row("edge")
+_ROTOR, _GENERATOR = T2B1I1CG.rotor, T2B1I1CG.generator
+_SPEED, _GENERATOR_SPEED = T2B1I1CG.rotor_speed, T2B1I1CG.generator_speed
 
 
 def _states(unknown: Array, azimuths: Array, ratio: float) -> Array:
     """(16, n) from (fore-aft, side-side, flap, its cosine and sine over the azimuth, edge, shaft twist, rotor speed)."""
     a, s, f, fc, fs, e, twist, speed = unknown
-    x = np.zeros((16, len(azimuths)))
+    x = np.zeros((_SIZE, len(azimuths)))
     psi = azimuths + np.arange(3)[:, None] * 2 * np.pi / 3
-    x[0], x[1], x[5] = a, s, e
-    x[2:5] = f + fc * np.cos(psi) + fs * np.sin(psi)
-    x[10:13] = speed * (fs * np.cos(psi) - fc * np.sin(psi))
-    x[6], x[7] = azimuths, ratio * (azimuths - twist)
-    x[14], x[15] = speed, ratio * speed
+    x[0], x[1], x[_EDGE] = a, s, e
+    x[_FLAPS] = f + fc * np.cos(psi) + fs * np.sin(psi)
+    x[_FLAP_RATES] = speed * (fs * np.cos(psi) - fc * np.sin(psi))
+    x[_ROTOR], x[_GENERATOR] = azimuths, ratio * (azimuths - twist)
+    x[_SPEED], x[_GENERATOR_SPEED] = speed, ratio * speed
     return x
 
 
 def _steady(
-    turbine: Turbine, wind: float, vertical_shear: float, horizontal_shear: float, pitch: float
+    turbine: Equations, wind: float, vertical_shear: float, horizontal_shear: float, pitch: float
 ) -> Array:
     """The unknowns of `_states` that balance the mean of every equation, and the once-per-revolution part of the flap's."""
     from scipy.optimize import root
@@ -46,12 +72,13 @@ def _steady(
     def residual(z: Array) -> Array:
         unknown = z * scale
         x = _states(unknown, azimuths, ratio)
-        acc = turbine.rhs(x, wind, vertical_shear, horizontal_shear, pitch)[8:]
-        swing = x[2:5] - unknown[2]
-        flap = (acc[2:5] + unknown[7] ** 2 * swing) / 50
+        acc = turbine.rhs(x, wind, vertical_shear, horizontal_shear, pitch)[_FREEDOMS:]
+        swing = x[_FLAPS] - unknown[2]
+        flap = (acc[_FLAPS] + unknown[7] ** 2 * swing) / 50
         mean = acc.mean(axis=1)
         harmonics = (flap * np.cos(psi)).mean(), (flap * np.sin(psi)).mean()
-        return np.array([mean[0], mean[1], flap.mean(), *harmonics, mean[5] / 50, mean[6], mean[7] / ratio])
+        drive = mean[_ROTOR], mean[_GENERATOR] / ratio
+        return np.array([mean[0], mean[1], flap.mean(), *harmonics, mean[_EDGE] / 50, *drive])
 
     # from the fastest rotation down, so that the point right of the power maximum is found, not the stalled one
     for tip_speed_ratio in (7.5, 9.0, 6.0, 5.0, 10.5, 4.0, 3.0, 12.0):
@@ -66,7 +93,7 @@ def _steady(
 
 
 def operating_point(
-    turbine: Turbine,
+    turbine: Equations,
     wind: float,
     vertical_shear: float,
     horizontal_shear: float,
@@ -86,35 +113,35 @@ def _multiblade(azimuth: float, speed: float) -> tuple[Array, Array, Array]:
     parts.append(-(speed**2) * np.column_stack([np.zeros(3), np.cos(psi), np.sin(psi)]))
     out = []
     for i, block in enumerate(parts):
-        t = np.eye(8) if i == 0 else np.zeros((8, 8))
-        t[2:5, 2:5] = block
+        t = np.eye(_FREEDOMS) if i == 0 else np.zeros((_FREEDOMS, _FREEDOMS))
+        t[_FLAPS, _FLAPS] = block
         out.append(t)
     return out[0], out[1], out[2]
 
 
-def linearised(turbine: Turbine, wind: float, pitch: float = 0.0) -> Array:
+def linearised(turbine: Equations, wind: float, pitch: float = 0.0) -> Array:
     """(16, 16) state matrix about the operating point in multiblade coordinates, averaged over the azimuth."""
     unknown = _steady(turbine, wind, 0.0, 0.0, pitch)
     ratio, speed = turbine.parameters["g_ratio"], unknown[7]
-    total = np.zeros((16, 16))
-    delta = np.array([1e-4, 1e-4, 1e-3, 1e-3, 1e-3, 1e-4, 1e-6, 1e-4] * 2)
+    total, q, rates = np.zeros((_SIZE, _SIZE)), slice(0, _FREEDOMS), slice(_FREEDOMS, _SIZE)
+    delta = np.array(T2B1I1CG.nudges)
     for azimuth in np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
         x = _states(unknown, np.array([azimuth]), ratio)[:, 0]
         shifts = np.concatenate([np.diag(delta), -np.diag(delta)], axis=1)
-        acc = turbine.rhs(x[:, None] + shifts, wind, pitch=pitch)[8:]
-        jacobian = (acc[:, :16] - acc[:, 16:]) / (2 * delta)
-        k, d = jacobian[:, :8], jacobian[:, 8:]
+        acc = turbine.rhs(x[:, None] + shifts, wind, pitch=pitch)[rates]
+        jacobian = (acc[:, :_SIZE] - acc[:, _SIZE:]) / (2 * delta)
+        k, d = jacobian[:, q], jacobian[:, rates]
         t, t1, t2 = _multiblade(azimuth, speed)
         inverse = np.linalg.inv(t)
-        block = np.zeros((16, 16))
-        block[:8, 8:] = np.eye(8)
-        block[8:, :8] = inverse @ (k @ t + d @ t1 - t2)
-        block[8:, 8:] = inverse @ (d @ t - 2 * t1)
+        block = np.zeros((_SIZE, _SIZE))
+        block[q, rates] = np.eye(_FREEDOMS)
+        block[rates, q] = inverse @ (k @ t + d @ t1 - t2)
+        block[rates, rates] = inverse @ (d @ t - 2 * t1)
         total += block / AZIMUTHS
     return total
 
 
-def natural_frequencies(turbine: Turbine, wind: float, pitch: float) -> list[tuple[str, float, float]]:
+def natural_frequencies(turbine: Equations, wind: float, pitch: float) -> list[tuple[str, float, float]]:
     """See Turbine.natural_frequencies."""
     p = turbine.parameters
     values, vectors = np.linalg.eig(linearised(turbine, wind, pitch))
@@ -128,8 +155,8 @@ def natural_frequencies(turbine: Turbine, wind: float, pitch: float) -> list[tup
     modes = []
     for value, vector in zip(values, vectors.T, strict=True):
         if value.imag > 2 * np.pi * 0.05:
-            share = (np.abs(vector[8:]) * weight) ** 2
-            share[6:8] = share[6:8].sum() / 2
+            share = (np.abs(vector[_FREEDOMS:]) * weight) ** 2
+            share[_ROTOR:_FREEDOMS] = share[_ROTOR:_FREEDOMS].sum() / 2
             modes.append((float(abs(value) / (2 * np.pi)), float(-value.real / abs(value)), share))
     modes.sort(key=lambda m: m[0])
     return [
@@ -147,7 +174,7 @@ def _names(shares: list[Array]) -> list[str]:
         "flap cyclic",
         "drivetrain and collective edge",
     )
-    groups = [[0], [1], [2], [3, 4], [], [5, 6, 7]]
+    groups = [[0], [1], [_FLAP], [_FLAP + 1, _FLAP + 2], [], [_EDGE, _ROTOR, _GENERATOR]]
     raw = []
     for share in shares:
         raw.append(kinds[int(np.argmax([sum(share[i] for i in g) for g in groups]))])

@@ -7,28 +7,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.layout import T2B1I1CG, Layout
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turbine_file
 from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
 
+if TYPE_CHECKING:
+    from fatigue_runner.turbine.lanes import KernelData
+
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class KernelData:
-    """What the kernels read for one turbine at one pitch, or with the pitch as a fourth signal: then the tables are (1, n)."""
-
-    constants: Array
-    tables: Array  # of the equations
-    load_tables: Array
-    cells: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +33,11 @@ class Turbine:
     parameters: Mapping[str, float]
     tables: AeroTables
     description: str = ""
+
+    @property
+    def layout(self) -> Layout:
+        """The states and signals of its equations."""
+        return T2B1I1CG
 
     @property
     def hash(self) -> str:
@@ -94,28 +93,30 @@ class Turbine:
         """
         from fatigue_runner.turbine.lanes import evaluate
 
-        x = np.asarray(state, float)
-        if x.ndim not in (1, 2) or x.shape[0] != 16:
-            raise InputError(f"state must have shape (16,) or (16, n), got {x.shape}")
-        columns = x.reshape(16, -1)
-        angle = np.asarray(pitch, float)
-        data = self.pitched_kernel_data() if angle.ndim else self.kernel_data(float(angle))
-        signals = [wind, vertical_shear, horizontal_shear, *([angle] if angle.ndim else [])]
-        p = np.stack([np.broadcast_to(np.asarray(s, float), columns.shape[1]) for s in signals])
-        return evaluate(data, columns, p)[0].reshape(x.shape)
+        x, size = np.asarray(state, float), self.layout.size
+        if x.ndim not in (1, 2) or x.shape[0] != size:
+            raise InputError(f"state must have shape ({size},) or ({size}, n), got {x.shape}")
+        columns = x.reshape(size, -1)
+
+        def signals(*values: ArrayLike) -> Array:
+            return np.stack([np.broadcast_to(np.asarray(v, float), columns.shape[1]) for v in values])
+
+        p, angle = signals(wind, vertical_shear, horizontal_shear), np.asarray(pitch, float)
+        if angle.ndim:
+            return evaluate(self.pitched_kernel_data(), columns, p, signals(angle))[0].reshape(x.shape)
+        return evaluate(self.kernel_data(float(angle)), columns, p)[0].reshape(x.shape)
 
     def loads(self, state: ArrayLike, wind: ArrayLike, pitch: ArrayLike = 0.0) -> dict[str, Array]:
-        """Load channels [SI] for states (n, 16) and wind signals (n, 3), the accelerations being those of the equations.
+        """Load channels [SI] for states (n, k) and wind signals (n, 3), the accelerations being those of the equations.
 
         pitch [rad]: a number, or (n,), the pitch of each state.
         """
         from fatigue_runner.turbine.lanes import load_channels
 
-        angle, signals = np.asarray(pitch, float), np.asarray(wind, float)
+        angle, x, signals = (np.asarray(values, float) for values in (pitch, state, wind))
         if angle.ndim:
-            signals = np.concatenate([signals, angle[:, None]], axis=1)
-        data = self.pitched_kernel_data() if angle.ndim else self.kernel_data(float(angle))
-        return load_channels(data, np.asarray(state, float), signals)
+            return load_channels(self.pitched_kernel_data(), x, signals, angle[:, None])
+        return load_channels(self.kernel_data(float(angle)), x, signals)
 
     def operating_point(
         self,
@@ -157,11 +158,13 @@ def _hash(turbine: Turbine) -> str:
 
 @lru_cache(maxsize=256)
 def _kernel_data(turbine: Turbine, pitch: float) -> KernelData:
-    from fatigue_runner.turbine.generated import kernel
+    from fatigue_runner.turbine.lanes import KernelData
+    from fatigue_runner.turbine.model import FIXED_PITCH
 
-    turned = at_pitch(turbine.parameters, pitch)
+    kernel = FIXED_PITCH.generated
     return KernelData(
-        constants=kernel.constants(turned),
+        model=FIXED_PITCH,
+        constants=kernel.constants(at_pitch(turbine.parameters, pitch)),
         tables=turbine.tables.cells(pitch, kernel.TABLES[: kernel.EQUATION_TABLES]),
         load_tables=turbine.tables.cells(pitch, kernel.TABLES),
         cells=len(turbine.tables.tip_speed_ratio) - 1,
@@ -170,13 +173,15 @@ def _kernel_data(turbine: Turbine, pitch: float) -> KernelData:
 
 @lru_cache(maxsize=4)
 def _pitched_kernel_data(turbine: Turbine) -> KernelData:
-    from fatigue_runner.turbine.generated import kernel, pitched
+    from fatigue_runner.turbine.lanes import KernelData
+    from fatigue_runner.turbine.model import VARYING_PITCH
 
-    names = kernel.TABLES
+    kernel = VARYING_PITCH.generated
     return KernelData(
-        constants=pitched.constants(turbine.parameters),
-        tables=turbine.tables.pitched_cells(names[: kernel.EQUATION_TABLES])[None],
-        load_tables=turbine.tables.pitched_cells(names)[None],
+        model=VARYING_PITCH,
+        constants=kernel.constants(turbine.parameters),
+        tables=turbine.tables.pitched_cells(kernel.TABLES[: kernel.EQUATION_TABLES]),
+        load_tables=turbine.tables.pitched_cells(kernel.TABLES),
         cells=len(turbine.tables.tip_speed_ratio) - 1,
     )
 

@@ -1,4 +1,4 @@
-"""Where everything of the turbine is, from the states in a log: the kinematics of `turbine/equations.py` as arrays.
+"""Where everything of the turbine is, from the states in a log: the kinematics of `turbine/derivation/equations.py` as arrays.
 
 Axes: x downwind, y to the left of who looks downwind, z up, origin at the tower base [m]. Frames N (nacelle), S (shaft), F
 (turning with the rotor) and the coned blade axes are those of the equations: N = Ry(slope_fa a) Rx(-slope_ss s), S is N

@@ -17,10 +17,10 @@ from corrector_example import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from simulating import simulate_block
 
 from fatigue_runner.corrector import coordinates, features, samples, threshold
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators import simulate_block
 from fatigue_runner.wind import ConstantWind, TurbulentWind
 
 UNSEEN = ConstantWind(7.4, 0.1, 0.02)

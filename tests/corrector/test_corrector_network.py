@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from corrector_example import collect, operating_points, trained, training_samples, turbine, with_map
+from simulating import simulate_block
 from typer.testing import CliRunner
 
 from fatigue_runner.cli import app
@@ -16,7 +17,6 @@ from fatigue_runner.corrector.features import DRIVE
 from fatigue_runner.corrector.recipe import Progress
 from fatigue_runner.corrector.train import train_file
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators import simulate_block
 from fatigue_runner.integrators.initial import initial_state
 from fatigue_runner.wind import ConstantWind
 

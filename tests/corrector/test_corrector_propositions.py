@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simulating import simulate_block
 
 P = 2  # Heun
 
@@ -62,7 +63,6 @@ def test_on_the_turbine_the_bound_holds_and_says_nothing_beyond_a_second():
     """With measured constants, in the coordinates of the modes, where L is smallest: the shaft's 24 rad/s."""
     from corrector_example import trained, training_samples, turbine
 
-    from fatigue_runner.integrators import simulate_block
     from fatigue_runner.wind import ConstantWind
 
     corrector, found, h = trained(), training_samples(), 0.02

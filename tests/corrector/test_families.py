@@ -31,7 +31,7 @@ from fatigue_runner.corrector import features, samples
 from fatigue_runner.corrector.maps import Map
 from fatigue_runner.corrector.recipe import GuardRecipe, Learned, Recipe
 from fatigue_runner.corrector.threshold import from_training_set
-from fatigue_runner.integrators.correction import pack
+from fatigue_runner.integrators.dense import pack
 from fatigue_runner.integrators.protocol import StageMapData
 from fatigue_runner.wind import ConstantWind
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from adams_example import error, runs, start, turbine, wind
 from corrector_example import with_map
+from simulating import simulate_block
 
 from fatigue_runner.corrector import CorrectorError, coordinates, features, find, load, save, steps
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators import exponential_adams as adams
-from fatigue_runner.integrators import method, simulate_block
+from fatigue_runner.integrators import method
 
 
 @cache
@@ -27,7 +27,7 @@ def test_compiled_steps_are_what_the_matrices_of_the_artefact_say():
     compiled = simulate_block(turbine(), "etdabm3", h, [blowing], start()[None], 8 * h, corrector=corrector)[
         0
     ]
-    base_ahead, base = adams.matrices(turbine(), method("etdabm3"), h, 0.0, past, corrector.damping)
+    base_ahead, base = method("etdabm3").matrices(turbine(), h, 0.0, past, corrector.damping)
     size, factors = corrector.binding.size, features.multi_blade_factors(corrector.map.factors)
     ahead, whole = corrector.map.predictor * size, corrector.map.linear * size
     whole[:, : base.shape[1]] += base

@@ -13,9 +13,10 @@ from fatigue_runner.errors import InputError
 
 pytest.importorskip("torch", reason="training needs the extra `train`")
 
+from simulating import simulate_block
+
 from fatigue_runner.corrector import artefact
 from fatigue_runner.corrector.train import read_recipe, train, tune_file
-from fatigue_runner.integrators import simulate_block
 from fatigue_runner.integrators.initial import initial_state
 from fatigue_runner.wind import ConstantWind
 

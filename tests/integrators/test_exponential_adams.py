@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from adams_example import error, runs, start, turbine, wind
 from scipy.linalg import expm
+from simulating import simulate_block
 
-from fatigue_runner.integrators import exponential_adams as adams
-from fatigue_runner.integrators import method, simulate_block, stability_limit
-from fatigue_runner.integrators.exponential import linear_part
+from fatigue_runner.integrators import method, multi_blade, stability_limit
+from fatigue_runner.integrators.linear_part import linear_part
+from fatigue_runner.layout import T2B1I1CG
+
+TURN = multi_blade.transforms(T2B1I1CG)
 
 
 def weight(a, h, nodes, j):
@@ -27,7 +30,7 @@ def test_the_compiled_loop_is_the_textbook_predictor_and_corrector(name):
     h, steps, blowing, x = 0.05, 7, wind(), start()
     found = method(name)
     compiled = simulate_block(turbine(), name, h, [blowing], x[None], steps * h)[0]
-    a = adams.linear(turbine(), 0.0).isotropic
+    a = multi_blade.linear(turbine(), 0.0).isotropic
 
     def f(t, y):
         return turbine().rhs(y, *blowing.at(np.array([t]))[0])
@@ -60,23 +63,23 @@ def test_the_compiled_loop_is_the_textbook_predictor_and_corrector(name):
 
 
 def test_the_linear_part_commutes_with_a_turn_of_the_blades_by_any_angle():
-    a = adams.linear(turbine(), 0.0).isotropic
+    a = multi_blade.linear(turbine(), 0.0).isotropic
     for angle in (0.3, 1.7, 4.0):
         c, s = np.cos(angle), np.sin(angle)
         turn = np.eye(16)
         for i in (3, 11):
             turn[i : i + 2, i : i + 2] = [[c, -s], [s, c]]
-        turn = np.linalg.inv(adams.T_STATE) @ turn @ adams.T_STATE
+        turn = np.linalg.inv(TURN.state) @ turn @ TURN.state
         assert np.abs(turn @ a - a @ turn).max() < 1e-9 * np.abs(a).max()
 
 
 def test_the_isotropic_part_is_what_the_average_over_the_azimuth_already_was():
-    averaged, a = linear_part(turbine(), 0.0), adams.linear(turbine(), 0.0).isotropic
+    averaged, a = linear_part(turbine(), 0.0), multi_blade.linear(turbine(), 0.0).isotropic
     assert np.abs(averaged - a).max() < 1e-3 * np.abs(averaged).max()
 
 
 def test_damping_moves_the_generator_s_own_entry_only():
-    plain, damped = (adams.linear(turbine(), 0.0, d).isotropic for d in (0.0, 1.5))
+    plain, damped = (multi_blade.linear(turbine(), 0.0, d).isotropic for d in (0.0, 1.5))
     assert np.argwhere(np.abs(plain - damped) > 1e-9).tolist() == [[15, 15]]
     assert plain[15, 15] - damped[15, 15] == pytest.approx(1.5)
 

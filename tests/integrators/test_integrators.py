@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simulating import simulate_block
 from smooth_turbine import smooth_turbine, smooth_wind
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators import METHODS, method, simulate_block, stability_limit
-from fatigue_runner.integrators.exponential import ExponentialRungeKutta
+from fatigue_runner.integrators import METHODS, method, stability_limit
+from fatigue_runner.integrators.adams import LinearMultistep
 from fatigue_runner.integrators.exponential_adams import ExponentialAdams
-from fatigue_runner.integrators.multistep import LinearMultistep
+from fatigue_runner.integrators.exponential_runge_kutta import ExponentialRungeKutta
 from fatigue_runner.integrators.output import hermite_weights
 from fatigue_runner.turbine.generated.kernel import LANES
 from fatigue_runner.wind import ConstantWind, StepWind, TurbulentWind

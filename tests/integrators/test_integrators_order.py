@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fatigue_runner.integrators import METHODS, method
-from fatigue_runner.integrators.multistep import LinearMultistep
-from fatigue_runner.integrators.tableaux import ButcherTableau
+from fatigue_runner.integrators.adams import LinearMultistep
+from fatigue_runner.integrators.butcher import ButcherTableau
 
 TABLEAUX = [name for name in METHODS if isinstance(method(name), ButcherTableau)]
 ADAMS = [name for name in METHODS if isinstance(method(name), LinearMultistep)]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simulating import simulate_block
 
 import fatigue_runner as fr
 from fatigue_runner.campaign.plan import make_plan
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators import METHODS, method, simulate_block
-from fatigue_runner.integrators.multistep import LinearMultistep
-from fatigue_runner.integrators.tableaux import ButcherTableau
+from fatigue_runner.integrators import METHODS, method
+from fatigue_runner.integrators.adams import LinearMultistep
+from fatigue_runner.integrators.butcher import ButcherTableau
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind, TurbulentWind
 

@@ -6,8 +6,8 @@ import cadynturb
 import numpy as np
 import pytest
 from independent_model import IndependentModel
+from simulating import simulate_block
 
-from fatigue_runner.integrators import simulate_block
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.generated import kernel
@@ -109,22 +109,13 @@ def test_the_foot_carries_the_weight_at_rest():
     x = np.zeros((1, 16))
     # the load kernel at given zero accelerations: a turbine that is held
     data = turbine.kernel_data()
-    from fatigue_runner.turbine.lanes import _load_groups, to_groups, work_space
+    from fatigue_runner.turbine.lanes import _load_groups, counters, to_groups
 
-    scratch, row, clamped = work_space()
     out = np.empty((1, len(kernel.LOADS) * kernel.LANES))
     columns, wind = to_groups(x.T.copy()), to_groups(np.array([[8.0], [0.0], [0.0]]))
+    control = np.zeros((1, 0))
     _load_groups(
-        columns,
-        wind,
-        np.zeros_like(columns),
-        data.load_tables,
-        data.cells,
-        data.constants,
-        scratch,
-        row,
-        clamped,
-        out,
+        data.model, columns, wind, control, np.zeros_like(columns), data.load_arrays(counters()), out
     )
     loads = dict(zip(kernel.LOADS, out[0, :: kernel.LANES], strict=True))
     rotor_arm = p["overhang"] * p["cos_tilt"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simulating import simulate_block
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators import simulate_block
 from fatigue_runner.turbine import load_turbine, table_builder
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.parameters import DATA, at_pitch

@@ -56,12 +56,12 @@ def _work(
     speeds = np.linspace(5.0, 10.0, 16)
     points = [turbine.operating_point(v) for v in speeds]
     x = np.empty((groups, 16, lanes))
-    wind = np.zeros((groups, 4 if pitched else 3, lanes))
+    wind, pitch = np.zeros((groups, 3, lanes)), np.zeros((groups, 1, lanes))
     for i in range(groups * lanes):
         x[i // lanes, :, i % lanes] = points[i % 16]
         wind[i // lanes, 0, i % lanes] = speeds[i % 16]
-        wind[i // lanes, 3:, i % lanes] = np.radians(i % 16 / 2)
-    arguments = right_hand_side.arguments(turbine, x[:16], wind[:16], pitched)
+        pitch[i // lanes, 0, i % lanes] = np.radians(i % 16 / 2)
+    arguments = right_hand_side.arguments(turbine, x[:16], wind[:16], pitch[:16] if pitched else None)
     repeats = max(1, 16000 // groups // max(1, lanes // 2))
 
     def once() -> float:
@@ -145,7 +145,7 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     packed, scalar = right_hand_side.packed(), right_hand_side.scalar()
     work = {f"packed {n}": _work(packed, turbine, n, LANES) for n in CASES}
     work |= {f"scalar {n}": _work(scalar, turbine, n, 1) for n in CASES}
-    work["pitched"] = _work(right_hand_side.pitched(), turbine, CASES[-1], LANES, pitched=True)
+    work["pitched"] = _work(right_hand_side.varying(), turbine, CASES[-1], LANES, pitched=True)
     work |= {f"step {name}": _step_work(turbine, name) for name in STEP_METHODS}
     work["peak"] = peak()
     with machine.pinned():

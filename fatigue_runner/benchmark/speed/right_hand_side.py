@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.compiled import INLINE, njit
-from fatigue_runner.integrators.block import aligned
-from fatigue_runner.integrators.stepping import wind_at
-from fatigue_runner.turbine import model
-from fatigue_runner.turbine.generated import kernel
-from fatigue_runner.turbine.lanes import LANES, to_groups, work_space
+from fatigue_runner.integrators.signals import Signals, signals_at
+from fatigue_runner.turbine.generated import kernel, pitched
+from fatigue_runner.turbine.lanes import LANES, aligned, counters, to_groups
+from fatigue_runner.turbine.model import rhs as rhs_of
 
 Array = np.ndarray
-_rhs = kernel.rhs
 
 
 def source() -> str:
@@ -37,17 +35,17 @@ def packed() -> Callable[..., None]:
     return _repeated(kernel.rhs)
 
 
-def pitched() -> Callable[..., None]:
+def varying() -> Callable[..., None]:
     """The same with a pitch of its own for every lane."""
-    return _repeated(model.rhs)
+    return _repeated(pitched.rhs)
 
 
 def scalar() -> Callable[..., None]:
     """The same of the same generated source, built for one lane; its look-up remains SIMD across tables."""
-    text = inspect.getsource(kernel).replace(f"LANES = {LANES}\n", "LANES = 1\n", 1)
+    text = inspect.getsource(kernel).replace("import LANES, Code", "import Code", 1)
     # without a file there is nothing to cache: it is compiled anew in every benchmark
     text = text.replace("from fatigue_runner.compiled import INLINE, njit", "from numba import njit")
-    space: dict[str, Any] = {"INLINE": INLINE, "__name__": "scalar_kernel"}
+    space: dict[str, Any] = {"LANES": 1, "INLINE": INLINE, "__name__": "scalar_kernel"}
     exec(compile(text, "<scalar kernel>", "exec"), space)
     return _repeated(space["rhs"])
 
@@ -57,53 +55,42 @@ def _repeated(rhs: Callable[..., None]) -> Callable[..., None]:
 
     @numba.njit(nogil=True)
     def run(
-        repeats: int,
-        x: Array,
-        wind: Array,
-        out: Array,
-        tables: Any,
-        cells: Any,
-        constants: Array,
-        scratch: Array,
-        row: Array,
-        clamped: Array,
-    ) -> None:
+        repeats: int, x: Array, wind: Array, control: Array, out: Array, tables: Array, cells: int, constants: Array, clamped: Array,
+    ) -> None:  # fmt: skip
         for _ in range(repeats):
-            rhs(x, wind, out, 0, tables, cells, constants, scratch, row, clamped)
+            rhs(x, wind, control, out, 0, tables, cells, constants, clamped)
 
     return run
 
 
 def arguments(
-    turbine: Any, states: Array, signals: Array, pitched: bool = False
+    turbine: Any, states: Array, wind: Array, pitch: Array | None = None
 ) -> Sequence[tuple[Any, ...]]:
     """What a repeated evaluation takes after the number of repeats, per group of lanes, in memory of its own as in a simulation.
 
-    states (groups, 16, lanes), signals (groups, 3 or, with the pitch [rad], 4, lanes).
+    states (groups, 16, lanes), wind (groups, 3, lanes), pitch [rad] (groups, 1, lanes) where it varies.
     """
-    data = turbine.pitched_kernel_data() if pitched else turbine.kernel_data(0.0)
-    tables = data.tables if pitched else aligned(data.tables)
+    data = turbine.kernel_data(0.0) if pitch is None else turbine.pitched_kernel_data()
+    tables = aligned(data.tables) if pitch is None else data.tables
     lanes = states.shape[2]
+    controls = np.zeros((len(states), 0, lanes)) if pitch is None else pitch
     return [
-        (aligned(x.ravel()), aligned(p.ravel()), aligned(np.zeros(x.size)), tables, data.cells, aligned(data.constants),
-         np.zeros(1), np.zeros(1), np.zeros(lanes, np.int64))
-        for x, p in zip(states, signals, strict=True)
+        (*(aligned(a.ravel()) for a in (x, p, u)), aligned(np.zeros(x.size)), tables, data.cells, aligned(data.constants),
+         np.zeros(lanes, np.int64))
+        for x, p, u in zip(states, wind, controls, strict=True)
     ]  # fmt: skip
 
 
 @njit(nogil=True)
-def _slope(t: float, x: Array, wind: Any, work: Any, data: Any) -> Array:
-    """f(t, x) (16,) of one case: the same state in every lane, the first one read."""
-    cell_duration, block = wind
-    state, p, slope, clamped = work
-    tables, count, constants, scratch, row = data
-    for i in range(16):
+def _slope(model: Any, t: float, x: Array, signals: Any, state: Array, slope: Array, data: Any) -> Array:
+    """f(t, x) of one case: the same state in every lane, the first one read."""
+    for i in range(len(x)):
         for j in range(LANES):
             state[i * LANES + j] = x[i]
-    wind_at(t, cell_duration, block, p)
-    _rhs(state, p, slope, 0, tables, count, constants, scratch, row, clamped)
-    out = np.empty(16)
-    for i in range(16):
+    signals_at(model, t, signals)
+    rhs_of(model, state, signals.p, signals.u, slope, 0, data)
+    out = np.empty(len(x))
+    for i in range(len(x)):
         out[i] = slope[i * LANES]
     return out
 
@@ -111,9 +98,10 @@ def _slope(t: float, x: Array, wind: Any, work: Any, data: Any) -> Array:
 def of_one_case(turbine: Any, wind: Any, duration: float, pitch: float) -> Callable[[float, Array], Array]:
     """f(t, x) of one case for `duration` [s] at a pitch [rad], compiled; the lanes beside it are wasted."""
     data = turbine.kernel_data(pitch)
+    layout = data.model.layout
     cell_duration, cells = wind.cells(duration)
     block = to_groups(np.ascontiguousarray(cells.reshape(-1, 1))).reshape(len(cells), 4, -1)
-    scratch, row, clamped = work_space()
-    work = np.zeros(16 * LANES), np.zeros(3 * LANES), np.zeros(16 * LANES), clamped
-    given = data.tables, data.cells, data.constants, scratch, row
-    return lambda t, x: _slope(t, x, (cell_duration, block), work, given)
+    signals = Signals(cell_duration, block, True, None, np.zeros(len(layout.wind) * LANES), np.zeros(0))
+    state, slope = np.zeros(layout.size * LANES), np.zeros(layout.size * LANES)
+    given = data.arrays(counters())
+    return lambda t, x: _slope(data.model, t, x, signals, state, slope, given)

@@ -28,7 +28,7 @@ from fatigue_runner.corrector.recipe import Array, GuardRecipe, Learned, Progres
 from fatigue_runner.corrector.samples import Samples, accurate_runs, moves, single_steps, wind_pieces
 from fatigue_runner.corrector.threshold import bounded, from_training_set
 from fatigue_runner.inputs.section import Section, problem
-from fatigue_runner.integrators.correcting import SHARING
+from fatigue_runner.integrators.methods import SHARING
 
 if TYPE_CHECKING:
     from fatigue_runner.trajectory import Trajectory

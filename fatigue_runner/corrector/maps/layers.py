@@ -42,7 +42,8 @@ def check(layers: Layers, inputs: int, activation: str) -> None:
 
 def packed(layers: Layers, activation: str, size: float) -> tuple[Array, NDArray[np.int64], int]:
     """`net`, `sizes` and `activation` of `integrators.protocol.StageMapData`; size: what the outputs are multiplied with."""
-    from fatigue_runner.integrators.correction import IDENTITY, ISRU, RELU, pack
+    from fatigue_runner.integrators.correction import IDENTITY, ISRU, RELU
+    from fatigue_runner.integrators.dense import pack
 
     parts, sizes = [], [0]
     for number, layer in enumerate(layers):

@@ -11,8 +11,9 @@ import numpy as np
 from fatigue_runner.corrector import features, steps
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.maps.map import Array, Map
-from fatigue_runner.integrators import exponential_adams as adams
+from fatigue_runner.integrators import multi_blade
 from fatigue_runner.integrators.protocol import MultiBladeData
+from fatigue_runner.layout import T2B1I1CG
 
 if TYPE_CHECKING:
     from fatigue_runner.corrector.binding import Binding
@@ -44,7 +45,7 @@ class MultiBladeMap(Map):
 
     @property
     def past(self) -> int:
-        return (self.predictor.shape[1] - adams.PAST_ROW) // adams.PARTS
+        return (self.predictor.shape[1] - multi_blade.past_row(T2B1I1CG)) // multi_blade.parts(T2B1I1CG)
 
     def check(self, method: Method, guard: Guard) -> None:
         features.multi_blade_factors(self.factors)
@@ -56,11 +57,13 @@ class MultiBladeMap(Map):
             )
         if not 0 <= self.damping < MOST_DAMPING:
             raise CorrectorError(f"the generator's damping must be a number from 0 to {MOST_DAMPING:g} 1/s")
-        if not 0 <= self.history <= adams.MOST_PAST:
-            raise CorrectorError(f"one of an exponential method looks back {adams.MOST_PAST} steps at most")
-        rows = adams.base_rows(past_of(method, self.history))
+        if not 0 <= self.history <= multi_blade.MOST_PAST:
+            raise CorrectorError(
+                f"one of an exponential method looks back {multi_blade.MOST_PAST} steps at most"
+            )
+        rows = multi_blade.base_rows(T2B1I1CG, past_of(method, self.history))
         wanted = (
-            (features.STATES, rows - adams.PARTS),
+            (features.STATES, rows - multi_blade.parts(T2B1I1CG)),
             (features.STATES, rows * (1 + len(self.factors))),
         )
         if (self.predictor.shape, self.linear.shape) != wanted:
@@ -70,10 +73,10 @@ class MultiBladeMap(Map):
             )
 
     def data(self, binding: Binding, turbine: Turbine, pitch: float) -> MultiBladeData:
-        from fatigue_runner.integrators.correction import pack
+        from fatigue_runner.integrators.dense import pack
 
         method: Any = binding.found
-        ahead, plain = adams.matrices(turbine, method, binding.step, pitch, self.past, self.damping)
+        ahead, plain = method.matrices(turbine, binding.step, pitch, self.past, self.damping)
         whole = self.linear * binding.size
         whole[:, : plain.shape[1]] += plain
         learned_ahead = ahead + self.predictor * binding.size

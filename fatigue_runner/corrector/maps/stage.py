@@ -59,7 +59,7 @@ class StageMap(Map):
         dense.check(self.layers, base - 1, self.activation)
 
     def data(self, binding: Binding, turbine: Turbine, pitch: float) -> StageMapData:
-        from fatigue_runner.integrators.correction import pack
+        from fatigue_runner.integrators.dense import pack
 
         linear = np.zeros(0) if self.linear is None else pack(self.linear * binding.size)[0]
         factors = np.array(features.factor_rows(self.factors), dtype=np.int64)

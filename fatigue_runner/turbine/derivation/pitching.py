@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from fatigue_runner.turbine.equations import P, Sheet, sin_cos_small
+from fatigue_runner.turbine.derivation.equations import P, Sheet, sin_cos_small
 
 PITCH = sp.Symbol("theta", real=True)  # [rad], positive to feather
 HARMONICS = sp.symbols(
@@ -18,7 +18,7 @@ HARMONICS = sp.symbols(
 
 
 def turned_parameters() -> dict[sp.Symbol, sp.Expr]:
-    """The parameters that turn with the pitch in terms of those at zero pitch, as `parameters.at_pitch`."""
+    """The parameters that turn with the pitch in terms of those at zero pitch, as `turbine.parameters.at_pitch`."""
     c, s, cc, ss = HARMONICS
     out = {P["cos_pitch"]: c, P["sin_pitch"]: s}
     for stem in ("b_f", "b_e", "b_rf", "b_re", "b_tip_f", "b_tip_e"):
