@@ -9,9 +9,9 @@ Array = NDArray[np.float64]
 
 
 def affine(features: Array, defects: Array, ridge: float = 1e-12) -> Array:
-    """(16, k) weights W that minimise |defects - features W^T|^2, each column scaled to unit size, with a small ridge.
+    """(states, k) weights W that minimise |defects - features W^T|^2, each column scaled to unit size, with a small ridge.
 
-    features (n, k), defects (n, 16). The ridge is relative to the scaled features: it only settles directions that the data leave open.
+    features (n, k), defects (n, states). The ridge is relative to the scaled features: it only settles directions that the data leave open.
     """
     scale = np.sqrt((features**2).mean(axis=0))
     scale[scale == 0] = 1.0
@@ -28,7 +28,7 @@ ROUNDS, KNEE = 4, 4.0
 
 
 def robust(features: Array, defects: Array, ridge: float = 1e-12, watched: tuple[int, ...] = ()) -> Array:
-    """(16, k) as `affine`, with little weight on the few steps that no affine map can follow (corners of the torque law, a run's start).
+    """(states, k) as `affine`, with little weight on the few steps that no affine map can follow (corners of the torque law, a run's start).
 
     Least squares repeated with the weights of Huber's loss: 1 / sqrt(1 + (r / KNEE)^2), r the largest residual of the outputs `watched`
     (all where empty) in units of their medians. Plain least squares lets those steps decide: its errors scatter with the seed of
@@ -46,7 +46,7 @@ def robust(features: Array, defects: Array, ridge: float = 1e-12, watched: tuple
 
 
 def relative_residual(prediction: Array, defects: Array) -> Array:
-    """(16,) rms of what is left of each state's defect, relative to the defect."""
+    """(states,) rms of what is left of each state's defect, relative to the defect."""
     size = np.sqrt((defects**2).mean(axis=0))
     size[size == 0] = 1.0
     return np.sqrt(((prediction - defects) ** 2).mean(axis=0)) / size

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from fatigue_runner.corrector import features, steps
+from fatigue_runner.corrector.coordinates import from_fixed
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.maps.map import Array, Map
 from fatigue_runner.integrators import multi_blade
@@ -94,7 +95,7 @@ class MultiBladeMap(Map):
     def predict(self, sampled: steps.Steps, size: float) -> Array:
         """Of the corrector; what the predictor adds is part of the plain results."""
         seen = sampled.multiplied(features.multi_blade_factors(self.factors))
-        return steps.from_fixed(seen @ (self.linear * size).T, sampled.turn)
+        return from_fixed(seen @ (self.linear * size).T, sampled.turn)
 
     def tensors(self) -> dict[str, Array]:
         return {"predictor": self.predictor, "linear": self.linear}

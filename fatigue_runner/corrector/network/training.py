@@ -1,11 +1,10 @@
-"""The one training loop of networks: AdamW, mini-batches, a falling learning rate, checkpoints; the one module that imports PyTorch."""
+"""The one training loop of networks: AdamW, mini-batches, a falling learning rate, checkpoints."""
 
 from __future__ import annotations
 
 import copy
 import hashlib
 import io
-import itertools
 import json
 import os
 import time
@@ -19,6 +18,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from fatigue_runner.corrector.network.model import layers_of, network
 from fatigue_runner.corrector.network.pairs import Pairs, Scaling, fold
 from fatigue_runner.corrector.network.settings import NetworkSettings
 from fatigue_runner.errors import InputError
@@ -62,32 +62,6 @@ class History:
     start: float = float("nan")  # loss before the first epoch, of a network that begins at zero
     stopped: bool = False
     device: str = "cpu"
-
-
-class _ISRU(torch.nn.Module):
-    """x / sqrt(1 + x^2), as the lane kernel has it."""
-
-    def forward(self, x: torch.Tensor) -> torch.Tensor:
-        return x * torch.rsqrt(1 + x * x)
-
-
-def network(inputs: int, outputs: int, settings: NetworkSettings) -> torch.nn.Sequential:
-    """Affine layers with the activation between them."""
-    sizes = (inputs, *settings.hidden, outputs)
-    parts: list[torch.nn.Module] = []
-    for a, b in itertools.pairwise(sizes):
-        parts += [torch.nn.Linear(a, b), torch.nn.ReLU() if settings.activation == "relu" else _ISRU()]
-    return torch.nn.Sequential(*parts[:-1])
-
-
-def layers_of(state: dict[str, torch.Tensor]) -> tuple[Array, ...]:
-    """(outputs, 1 + inputs) matrices with the bias first, float64, of a `network`'s parameters."""
-    numbers = sorted({int(name.split(".")[0]) for name in state})
-    out = []
-    for i in numbers:
-        weight, bias = (state[f"{i}.{part}"].cpu().double().numpy() for part in ("weight", "bias"))
-        out.append(np.concatenate([bias[:, None], weight], axis=1))
-    return tuple(out)
 
 
 def train(
@@ -196,6 +170,8 @@ class _Run:
     def epoch(self) -> None:
         """One pass over the samples in a new order, the validation loss, and a step of the scheduler."""
         begin, rate = time.monotonic(), self.rate
+        inputs: Any
+        targets: Any  # PyTorch's own hints have holes
         inputs, targets = self.samples
         order = torch.randperm(len(inputs), generator=self.order).to(self.device)
         total = torch.zeros((), device=self.device, dtype=torch.float64)
@@ -204,7 +180,7 @@ class _Run:
         )
         for x, y in batches:
             self.optimizer.zero_grad()
-            loss = self.loss(self.model(x), y)
+            loss: Any = self.loss(self.model(x), y)
             loss.backward()
             self.optimizer.step()
             total += loss.detach() * len(x)
