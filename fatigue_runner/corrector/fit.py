@@ -28,7 +28,7 @@ ROUNDS, KNEE = 4, 4.0
 
 
 def robust(features: Array, defects: Array, ridge: float = 1e-12, watched: tuple[int, ...] = ()) -> Array:
-    """(states, k) as `affine`, with little weight on the few steps that no affine map can follow (corners of the torque law, a run's start).
+    """(states, k) as `affine`, with little weight on the few steps that no affine map can follow: corners of the torque law, the start.
 
     Least squares repeated with the weights of Huber's loss: 1 / sqrt(1 + (r / KNEE)^2), r the largest residual of the outputs `watched`
     (all where empty) in units of their medians. Plain least squares lets those steps decide: its errors scatter with the seed of
