@@ -89,6 +89,20 @@ def test_the_same_seed_gives_the_same_bits_and_another_one_others(made, tmp_path
     assert not np.array_equal(other.corrector.map.layers[0], again.map.layers[0])
 
 
+def test_a_training_that_was_stopped_goes_on_to_the_same_bits(made, tmp_path):
+    def press_ctrl_c(told):
+        if told["epoch"] == 5:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "training.checkpoint"
+    cut = train_file(recipe(tmp_path), progress=Progress(epoch=press_ctrl_c, checkpoint=path)).corrector
+    assert path.exists() and cut.training["network_epochs"] == 5
+    resumed = train_file(recipe(tmp_path), progress=Progress(checkpoint=path)).corrector
+    assert not path.exists()
+    for a, b in zip(resumed.map.layers, made[0].corrector.map.layers, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
 def test_training_leaves_the_callers_random_numbers_and_threads_alone():
     torch.manual_seed(5)
     expected, threads = torch.rand(1).item(), torch.get_num_threads()

@@ -83,6 +83,16 @@ def test_the_same_recipe_gives_the_same_bits_and_another_seed_others(made, tmp_p
         (lambda t: "[1, 2]", "a recipe is a mapping of keys (name, family, method"),
         (lambda t: t.replace("duration: 15", "duration: 0.02"), "training.duration must be at least 2; got 0.02"),
         (lambda t: t + "turbine: nrel5mv\n", "nrel5mv"),
+        (lambda t: t + "generator_damping: 1.5\n", "the key belongs to family affine of exponential-adams methods"),
+        (
+            lambda t: t.replace("heun", "etdabm3") + "perturbation: 1.0e-5\n",
+            "quick.yaml:9: perturbation: the key belongs to family affine of runge-kutta methods",
+        ),
+        (lambda t: t.replace("heun", "etdabm3") + "guard: {substeps: 2}\n", "quick.yaml:9: unknown key 'substeps' in guard"),
+        (
+            lambda t: t.replace("heun", "etdabm3") + "factors: [sin_azimuth]\n",
+            "quick.yaml:9: factors: feature factor 'sin_azimuth' does not exist for exponential methods",
+        ),
     ],
 )  # fmt: skip
 def test_a_wrong_recipe_is_refused_with_the_file_and_the_way_out(tmp_path, change, words):
