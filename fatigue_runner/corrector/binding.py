@@ -9,7 +9,7 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import method as find_method
 
 if TYPE_CHECKING:
-    from fatigue_runner.integrators.methods import Method
+    from fatigue_runner.integrators.contract import Method
     from fatigue_runner.turbine import Turbine
 
 SAME_STEP = 1e-9  # relative

@@ -91,7 +91,8 @@ def single_steps(
     (n, m, 4, signals)."""
     from fatigue_runner.integrators.runge_kutta import runge_kutta_arrays, stage_rows
     from fatigue_runner.integrators.single_steps import step_samples
-    from fatigue_runner.turbine.lanes import LANES, counters, from_groups, to_groups
+    from fatigue_runner.turbine.lane_code import LANES
+    from fatigue_runner.turbine.lanes import counters, from_groups, to_groups
 
     n = len(states)
     x = to_groups(np.ascontiguousarray(states.T))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.integrators import adams, exponential_adams, exponential_runge_kutta, tableaux
-from fatigue_runner.integrators.butcher import ButcherTableau
 from fatigue_runner.integrators.contract import Method
 
 _FAMILIES = (tableaux, adams, exponential_runge_kutta, exponential_adams)
@@ -20,9 +19,9 @@ _BY_NAME: dict[str, Method] = {
 
 # the method of the next order that has the same first stages, by name
 SHARING = {
-    name: found.shared_by.name
+    name: other.name
     for name, found in _BY_NAME.items()
-    if isinstance(found, ButcherTableau) and found.shared_by is not None
+    if (other := getattr(found, "shared_by", None)) is not None
 }
 
 METHODS = (*_BY_NAME, "dop853")

@@ -229,7 +229,11 @@ def tower_modes(parameters: Mapping[str, Any]) -> TowerModes:
 
 
 def _tower_mode(
-    tower: Mapping[str, Any], name: str, length: float, stations: dict, lumped: tuple
+    tower: Mapping[str, Any],
+    name: str,
+    length: float,
+    stations: dict[str, Array],
+    lumped: tuple[Array, Array],
 ) -> TowerMode:
     x = np.linspace(0.0, 1.0, _FINE_POINTS)
     nodes, masses = lumped
@@ -256,7 +260,7 @@ def _tower_mode(
 
 
 def _single_mode(
-    coefficients: Any, length: float, lumped: tuple, stiffness: Array, ratio: float
+    coefficients: Any, length: float, lumped: tuple[Array, Array], stiffness: Array, ratio: float
 ) -> dict[str, float]:
     """Modal mass, stiffness, damping and frequency [Hz] of one mode alone, without centrifugal stiffening."""
     polynomial = mode_shape(coefficients, "mode")
@@ -296,7 +300,9 @@ def stations_of(member: Mapping[str, Any], fraction: str, place: str) -> dict[st
     return stations
 
 
-def _lumped(lengths: Any, length: float, stations: dict, fraction: str, factor: float) -> tuple[Array, Array]:
+def _lumped(
+    lengths: Any, length: float, stations: dict[str, Array], fraction: str, factor: float
+) -> tuple[Array, Array]:
     """Middles [m] and masses [kg] of elements with these relative lengths."""
     sizes = np.array(lengths, dtype=float)
     sizes *= length / sizes.sum()

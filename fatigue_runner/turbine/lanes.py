@@ -35,13 +35,15 @@ class KernelData:
 
 
 @njit(nogil=True)
-def _evaluate(model, x, wind, control, data, out):
+def _evaluate(model: Any, x: Array, wind: Array, control: Array, data: KernelArrays, out: Array) -> None:
     for group in range(x.shape[0]):
         rhs(model, x[group], wind[group], control[group], out[group], 0, data)
 
 
 @njit(nogil=True)
-def _load_groups(model, x, wind, control, derivative, data, out):
+def _load_groups(
+    model: Any, x: Array, wind: Array, control: Array, derivative: Array, data: KernelArrays, out: Array
+) -> None:
     for group in range(x.shape[0]):
         loads(model, x[group], wind[group], control[group], derivative[group], out[group], 0, data)
 

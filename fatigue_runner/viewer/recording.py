@@ -15,7 +15,7 @@ import rerun as rr
 from fatigue_runner import channels
 from fatigue_runner.viewer import colours, shapes
 from fatigue_runner.viewer.cases import Viewed
-from fatigue_runner.viewer.scene import local_wind
+from fatigue_runner.viewer.scene import DRAWN, local_wind
 from fatigue_runner.viewer.styles import SOLVER_SERIES, read_unit, set_style
 
 TIMELINE = "time"
@@ -159,7 +159,7 @@ class Stage:
 
     def _send_scene(self, case: Viewed, rows: slice) -> None:
         frames = self._frames(case, rows, FRAME_RATE, MAX_FRAMES // len(self.cases))
-        frames = frames[np.isfinite(case.log.state[frames][:, :7]).all(axis=1)]
+        frames = frames[np.isfinite(case.log.state[frames][:, DRAWN]).all(axis=1)]
         if len(frames):
             self._send_turbine(case, frames)
         frames = self._frames(case, rows, WIND_RATE, MAX_FRAMES // (4 * len(self.cases)))

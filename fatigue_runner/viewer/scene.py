@@ -18,12 +18,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.errors import InputError
+from fatigue_runner.layout import BLADES, T2B1I1CG
 from fatigue_runner.turbine.beam import BladeModes, TowerMode, TowerModes, blade_modes, tower_modes
 
 Array = NDArray[np.float64]
 
-BLADES = 3
+_FORE_AFT, _SIDE_SIDE, _EDGE = (T2B1I1CG.row(name) for name in ("tower_fore_aft", "tower_side_side", "edge"))
+_FLAPS = slice(T2B1I1CG.blade_sets[0], T2B1I1CG.blade_sets[0] + BLADES)
+_AZIMUTH = T2B1I1CG.rotor
+DRAWN = slice(0, _AZIMUTH + 1)  # the states that a picture needs
 _AROUND: Array = np.linspace(0.0, 2 * pi, BLADES, endpoint=False)  # the blades' places on the hub [rad]
 
 
@@ -75,24 +80,24 @@ class Geometry:
         return self.blade.flap_at(radius) @ turn.T, self.blade.edge_at(radius) @ turn.T
 
     def deflection(self, state: Array, radius: Array, scale: float = 1.0) -> Array:
-        """Displacement of the blades along e1, e2, e3 (n, 3, stations, 3) [m] for states (n, 16)."""
+        """Displacement of the blades along e1, e2, e3 (n, 3, stations, 3) [m] for states (n, rows of the layout)."""
         flap, edge = self.modes_at(radius)
-        f = scale * state[:, 2:5, None]
-        e = scale * state[:, 5, None, None]
+        f = scale * state[:, _FLAPS, None]
+        e = scale * state[:, _EDGE, None, None]
         across = f[..., None] * flap + e[..., None] * edge
         shortening = [np.interp(radius, self.blade.grid, column) for column in self.blade.shortening.T]
         along = -(shortening[0] * f**2 + 2 * shortening[1] * f * e + shortening[2] * e**2) / 2
         return np.concatenate([across, along[..., None]], axis=-1)
 
     def pose(self, state: Array, radius: Array, levels: int = 9, scale: float = 1.0) -> Pose:
-        """Place all parts for states (n, 16); blades at the distances `radius` from the apex [m].
+        """Place all parts for states (n, rows of the layout); blades at the distances `radius` from the apex [m].
 
         Raises InputError for states of another shape.
         """
         state = np.asarray(state, float)
-        if state.ndim != 2 or state.shape[1] != 16:
-            raise InputError(f"states must have shape (n, 16), got {state.shape}")
-        a, s = scale * state[:, 0], scale * state[:, 1]
+        if state.ndim != 2 or state.shape[1] != len(STATE_NAMES):
+            raise InputError(f"states must have shape (n, {len(STATE_NAMES)}), got {state.shape}")
+        a, s = scale * state[:, _FORE_AFT], scale * state[:, _SIDE_SIDE]
         tower = self._tower(a, s, np.linspace(0.0, self.tower.length, levels))
         nacelle = rotation_y(self.tower.fore_aft.top_slope * a) @ rotation_x(
             -self.tower.side_side.top_slope * s
@@ -103,7 +108,7 @@ class Geometry:
         apex = tower[:, -1] + nacelle @ arm
         # the shaft axis is (cos tilt, 0, sin tilt) in N
         shaft = nacelle @ rotation_y(np.array([-self.tilt]))
-        rotor = shaft @ rotation_x(state[:, 6])
+        rotor = shaft @ rotation_x(state[:, _AZIMUTH])
         place = rotation_x(_AROUND) @ rotation_y(np.full(BLADES, self.cone))
         coned = rotor[:, None] @ place
         local = self.deflection(state, radius, scale)

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.benchmark.speed import machine, right_hand_side
-from fatigue_runner.turbine.lanes import LANES
+from fatigue_runner.channels import STATE_NAMES, WIND_NAMES
+from fatigue_runner.turbine.lane_code import LANES
 
 CASES = (1, 8, 16, 64, 256)
 STEP_METHODS = ("heun", "rk3", "rk4", "tsit5", "dop853", "ab4", "abm4", "etdrk4", "etdabm3")
@@ -55,8 +56,8 @@ def _work(
     groups = -(-cases // lanes)
     speeds = np.linspace(5.0, 10.0, 16)
     points = [turbine.operating_point(v) for v in speeds]
-    x = np.empty((groups, 16, lanes))
-    wind, pitch = np.zeros((groups, 3, lanes)), np.zeros((groups, 1, lanes))
+    x = np.empty((groups, len(STATE_NAMES), lanes))
+    wind, pitch = np.zeros((groups, len(WIND_NAMES), lanes)), np.zeros((groups, 1, lanes))
     for i in range(groups * lanes):
         x[i // lanes, :, i % lanes] = points[i % 16]
         wind[i // lanes, 0, i % lanes] = speeds[i % 16]

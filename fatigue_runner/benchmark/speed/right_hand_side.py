@@ -14,7 +14,8 @@ import numpy as np
 from fatigue_runner.compiled import INLINE, njit
 from fatigue_runner.integrators.signals import Signals, signals_at
 from fatigue_runner.turbine.generated import kernel, pitched
-from fatigue_runner.turbine.lanes import LANES, aligned, counters, to_groups
+from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.lanes import aligned, counters, to_groups
 from fatigue_runner.turbine.model import rhs as rhs_of
 
 Array = np.ndarray

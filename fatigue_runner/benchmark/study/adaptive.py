@@ -18,6 +18,7 @@ from fatigue_runner.benchmark.study.cases import Cases
 from fatigue_runner.benchmark.study.integrators import ADAPTIVE
 from fatigue_runner.benchmark.study.points import Point, Reference, evaluate
 from fatigue_runner.integrators import Integrator, simulate
+from fatigue_runner.layout import T2B1I1CG
 
 METHODS = ("dop853-adaptive", "tsit5-adaptive")
 # Absolute tolerance of a state as a fraction of its range: the states differ by four orders of magnitude.
@@ -73,9 +74,10 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
     times = np.arange(round(duration / cases.output_step) + 1) * cases.output_step
     f = right_hand_side.of_one_case(turbine, wind, duration, cases.pitch)
     scale = ranges(cases, number)
+    q_rows, v_rows = T2B1I1CG.positions, T2B1I1CG.velocities
     begin = time.perf_counter()
     stepper = solver(name)(f, 0.0, initial, duration, rtol=tolerance, atol=ABSOLUTE * tolerance * scale)
-    states, filled = np.empty((len(times), 16)), 1
+    states, filled = np.empty((len(times), len(initial))), 1
     states[0] = stepper.y
     old, old_slope = stepper.y.copy(), stepper.f.copy()
     while stepper.status == "running":
@@ -85,12 +87,12 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
             q, v = hermite_weights((times[filled] - stepper.t_old) / h, (0.0, 1.0))
             given = np.stack(
                 [
-                    old[:8],
-                    h * old[8:],
-                    h * h * old_slope[8:],
-                    stepper.y[:8],
-                    h * stepper.y[8:],
-                    h * h * stepper.f[8:],
+                    old[q_rows],
+                    h * old[v_rows],
+                    h * h * old_slope[v_rows],
+                    stepper.y[q_rows],
+                    h * stepper.y[v_rows],
+                    h * h * stepper.f[v_rows],
                 ]
             )
             states[filled] = np.concatenate([q @ given, v @ given / h])

@@ -19,7 +19,7 @@ from fatigue_runner.layout import T2B1I1CG
 if TYPE_CHECKING:
     from fatigue_runner.corrector.binding import Binding
     from fatigue_runner.corrector.guard import Guard
-    from fatigue_runner.integrators.methods import Method
+    from fatigue_runner.integrators.contract import Method
     from fatigue_runner.trajectory import Trajectory
     from fatigue_runner.turbine import Turbine
 

@@ -15,7 +15,7 @@ from fatigue_runner.integrators.protocol import RawNetworkData
 if TYPE_CHECKING:
     from fatigue_runner.corrector.binding import Binding
     from fatigue_runner.corrector.guard import Guard
-    from fatigue_runner.integrators.methods import Method
+    from fatigue_runner.integrators.contract import Method
     from fatigue_runner.trajectory import Trajectory
     from fatigue_runner.turbine import Turbine
 

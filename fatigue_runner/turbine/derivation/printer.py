@@ -178,7 +178,7 @@ def kernel(
         inputs |= {s: f"derivative[{first + i}]" for i, s in enumerate(eq.ACCELERATION)}
     inputs[eq.HALF_SQRT3] = repr(3**0.5 / 2)
     inputs |= {c: f"constants[{i}]" for i, c in enumerate(constants)}
-    phi = eq.STATE[6]
+    phi = eq.STATE[variant.layout.rotor]
     source = [f"{phi} = {inputs.pop(phi)}"]
     if variant.varying_pitch:
         source.append(f"{PITCH} = {inputs.pop(PITCH)}")
