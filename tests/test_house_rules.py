@@ -106,7 +106,6 @@ NO_STATES = {
             *("points[i % 16]", "range(16)", "speeds[i % 16]", "wind[:16]", "x[:16]"),
         },
     ),
-    "corrector/features.py": ("letters of a name", {"v[6:]"}),
     "corrector/train_command.py": ("lines of a card", {"validation_rows(made.corrector)[:7]"}),
     "integrators/output.py": ("numbers of the interpolant", {"first[i, 6 - len(x):]"}),
     "integrators/stepping.py": (

@@ -1,6 +1,7 @@
 """A corrector's file: safetensors, never pickle: the map's arrays and a JSON header with all the rest.
 
-The header is flat and its keys are the same for every map: those that a map does not know have the value that means nothing.
+The header is flat and its keys are the same for every map: those that a map does not know have the value that means nothing. `states`
+and `wind` name what the map sees, where that is more than the turbine's own states and the wind's first three signals.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from fatigue_runner.corrector.corrector import Corrector
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.maps import MAPS, map_class
+from fatigue_runner.layout import T2B1I1CG, Channel, FirstOrder, Layout
 
 FORMAT = "fatigue-runner corrector 1"
 _FACTS = ("wind_range", "validation", "training", "recipe", "licence")
@@ -42,6 +44,7 @@ def save(corrector: Corrector, path: Path) -> None:
 
 
 def _header(corrector: Corrector) -> dict[str, Any]:
+    signals = _signals(corrector.map.layout)
     guard = asdict(corrector.guard)
     ahead_atol = guard.pop("ahead_atol")
     return {
@@ -54,7 +57,27 @@ def _header(corrector: Corrector) -> dict[str, Any]:
         **{fact: getattr(corrector, fact) for fact in _FACTS},
         "guard": guard,
         "ahead_atol": ahead_atol,
+        **(signals if signals != _signals(T2B1I1CG) else {}),
     }
+
+
+def _signals(layout: Layout) -> dict[str, list[str]]:
+    return {"states": list(layout.names), "wind": [channel.name for channel in layout.wind]}
+
+
+def _layout(header: dict[str, Any]) -> Layout:
+    """The layout whose names the header has. Raises CorrectorError for other equations than this program's."""
+    if "states" not in header:
+        return T2B1I1CG
+    (own, blown), (states, wind) = (
+        (named["states"], named["wind"]) for named in (_signals(T2B1I1CG), header)
+    )
+    if states[: len(own)] != own or wind[: len(blown)] != blown:
+        raise CorrectorError(f"corrector {header['name']} is for other states or winds than this program has")
+    return T2B1I1CG.extended(
+        first_order=tuple(FirstOrder(Channel(name, "", name, "")) for name in states[len(own) :]),
+        wind=tuple(Channel(name, "", name, "") for name in wind[len(blown) :]),
+    )
 
 
 def load(path: Path | str) -> Corrector:
@@ -95,7 +118,7 @@ def _corrector(header: dict[str, Any], tensors: dict[str, Any]) -> Corrector:
         header["name"],
         header["family"],
         Binding(*(header[key] for key in ("turbine", "turbine_hash", "method", "step"))),
-        kind.read(header, tensors),
+        kind.read(header, tensors, _layout(header)),
         Guard(**guard, ahead_atol=tuple(header.get("ahead_atol", ()))),
         **{**facts, "wind_range": tuple(facts["wind_range"])},
     )

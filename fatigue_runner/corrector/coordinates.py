@@ -1,6 +1,6 @@
-"""States and accelerations in the coordinates that maps see: the shaft's twist for the generator's angle, blades in multi-blade form.
+"""States and slopes in the coordinates that maps see: the shaft's twist for the generator's angle, blades in multi-blade form.
 
-Numpy's form of what integrators/correction.py and integrators/exponential_adams.py compile.
+Numpy's form of what integrators/correction.py and integrators/multi_blade_rows.py compile.
 """
 
 from __future__ import annotations
@@ -10,58 +10,52 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fatigue_runner.corrector.features import (
-    FREEDOMS,
-    GENERATOR,
-    GENERATOR_SPEED,
-    PART_BLADES,
-    RELATIVE_BLADES,
-    ROTOR,
-    ROTOR_SPEED,
-    STATE_BLADES,
-)
 from fatigue_runner.integrators import multi_blade
-from fatigue_runner.layout import T2B1I1CG
+from fatigue_runner.layout import Layout
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
 Array = NDArray[np.float64]
-_TURN = multi_blade.transforms(T2B1I1CG)
-
 Turn = tuple[Array, Array]  # cosine and sine (n,) of the azimuth
 
 
-def turn_of(x: Array) -> Turn:
-    """The turn of the rotor in states (n, states)."""
-    azimuth = x[:, ROTOR]
+def turn_of(layout: Layout, x: Array) -> Turn:
+    """The turn of the rotor in states (n, size)."""
+    azimuth = x[:, layout.rotor]
     return np.cos(azimuth), np.sin(azimuth)
 
 
-def relative(x: Array, ratio: float) -> Array:
-    """(n, states - 1) deflections, shaft twist, rates, rate of the twist of states (n, states); ratio: of the gearbox."""
-    twist = x[:, ROTOR] - x[:, GENERATOR] / ratio
-    rate = x[:, ROTOR_SPEED] - x[:, GENERATOR_SPEED] / ratio
+def relative(layout: Layout, x: Array, ratio: float) -> Array:
+    """(n, size - 1) deflections, shaft twist, rates, rate of the twist, first-order states of states (n, size); ratio: of the gearbox."""
+    rotor, n = layout.rotor, layout.freedoms
+    twist = x[:, rotor] - x[:, layout.generator] / ratio
+    rate = x[:, layout.rotor_speed] - x[:, layout.generator_speed] / ratio
     return np.concatenate(
-        [x[:, :ROTOR], twist[:, None], x[:, FREEDOMS:GENERATOR_SPEED], rate[:, None]], axis=1
+        [x[:, :rotor], twist[:, None], x[:, n : 2 * n - 1], rate[:, None], x[:, 2 * n :]], axis=1
     )
 
 
-def accelerations(turbine: Turbine, x: Array, wind: Array) -> Array:
-    """(n, freedoms) of states (n, states) under wind (n, signals), the twist's in place of the generator's."""
+def slopes(turbine: Turbine, x: Array, wind: Array) -> Array:
+    """(n, k) accelerations of states (n, size) under wind (n, signals), the twist's in place of the generator's; then slopes of the
+    first-order states."""
     from fatigue_runner.turbine.lanes import evaluate
 
+    layout = turbine.layout
     slope = evaluate(turbine.kernel_data(0.0), np.ascontiguousarray(x.T), np.ascontiguousarray(wind.T))[0].T
-    out = slope[:, FREEDOMS:].copy()
-    out[:, GENERATOR] = slope[:, ROTOR_SPEED] - slope[:, GENERATOR_SPEED] / turbine.parameters["g_ratio"]
+    out = slope[:, layout.freedoms :].copy()
+    out[:, layout.generator] = (
+        slope[:, layout.rotor_speed] - slope[:, layout.generator_speed] / turbine.gearbox_ratio
+    )
     return np.asarray(out)
 
 
 def nonlinear_part(turbine: Turbine, x: Array, wind: Array, damping: float) -> Array:
-    """(n, freedoms) accelerations without their linear part; damping [1/s]: see `multi_blade.linear`."""
-    ratio = turbine.parameters["g_ratio"]
-    linear = relative(x, ratio) @ multi_blade.linear(turbine, 0.0, damping).low.T
-    return np.asarray(accelerations(turbine, x, wind) - linear)
+    """(n, k) slopes without their linear part; damping [1/s]: see `multi_blade.linear`."""
+    linear = multi_blade.linear(turbine, 0.0, damping).low
+    return np.asarray(
+        slopes(turbine, x, wind) - relative(turbine.layout, x, turbine.gearbox_ratio) @ linear.T
+    )
 
 
 def _turned(values: Array, first: tuple[int, ...], turn: Turn, sign: int) -> Array:
@@ -74,21 +68,22 @@ def _turned(values: Array, first: tuple[int, ...], turn: Turn, sign: int) -> Arr
     return out
 
 
-def from_fixed(change: Array, turn: Turn) -> Array:
-    """(n, states) changes of the state from multi-blade coordinates."""
-    return np.asarray(_turned(change, STATE_BLADES, turn, -1) @ np.linalg.inv(_TURN.state).T)
+def from_fixed(layout: Layout, change: Array, turn: Turn) -> Array:
+    """(n, size) changes of the state from multi-blade coordinates."""
+    back = np.linalg.inv(multi_blade.transforms(layout).state)
+    return np.asarray(_turned(change, layout.state_blade_sets, turn, -1) @ back.T)
 
 
-def to_fixed(change: Array, turn: Turn) -> Array:
-    """(n, states) changes of the state in multi-blade coordinates."""
-    return _turned(change @ _TURN.state.T, STATE_BLADES, turn, 1)
+def to_fixed(layout: Layout, change: Array, turn: Turn) -> Array:
+    """(n, size) changes of the state in multi-blade coordinates."""
+    return _turned(change @ multi_blade.transforms(layout).state.T, layout.state_blade_sets, turn, 1)
 
 
-def relative_to_fixed(values: Array, turn: Turn) -> Array:
-    """(n, states - 1) relative coordinates in multi-blade form."""
-    return _turned(values @ _TURN.relative.T, RELATIVE_BLADES, turn, 1)
+def relative_to_fixed(layout: Layout, values: Array, turn: Turn) -> Array:
+    """(n, size - 1) relative coordinates in multi-blade form."""
+    return _turned(values @ multi_blade.transforms(layout).relative.T, layout.relative_blade_sets, turn, 1)
 
 
-def parts_to_fixed(parts: Array, turn: Turn) -> Array:
-    """(n, freedoms) nonlinear parts in multi-blade form."""
-    return _turned(parts @ _TURN.parts.T, PART_BLADES, turn, 1)
+def parts_to_fixed(layout: Layout, parts: Array, turn: Turn) -> Array:
+    """(n, k) nonlinear parts in multi-blade form."""
+    return _turned(parts @ multi_blade.transforms(layout).parts.T, layout.blade_sets, turn, 1)

@@ -88,6 +88,8 @@ class Corrector:
     def bind(self, turbine: Turbine, method: str, step: float) -> None:
         """Raises CorrectorError unless it was trained for this turbine, method and step [s]."""
         refusal = self.binding.refusal(turbine, method, step)
+        if not refusal and turbine.layout.names != self.map.layout.names:
+            refusal = f"was trained for a turbine of {self.map.layout.size} states, this one has {turbine.layout.size}; train one"
         if refusal:
             raise CorrectorError(f"corrector {self.name} {refusal}")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fatigue_runner.corrector.errors import CorrectorError
-from fatigue_runner.corrector.features import STATES
 
 NORMS = ("max", "rms")
 
@@ -40,16 +39,31 @@ class Guard:
             raise CorrectorError("guard: low and high need a number per feature each, low at most at high")
         if self.norm not in NORMS:
             raise CorrectorError(f"guard: norm must be one of {', '.join(NORMS)}, got {self.norm!r}")
-        if not all(a > 0 for a in self.atol) or len(self.atol) != STATES or len(self.rtol) != STATES:
+        if not all(a > 0 for a in (*self.atol, *self.ahead_atol)):
             raise CorrectorError(
-                f"guard: atol needs {STATES} positive numbers: with 0 a state that crosses zero refuses every step"
+                "guard: atol needs positive numbers: with 0 a state that crosses zero refuses every step"
             )
         if not (self.kappa >= 1 and self.limit >= 0 and 0 < self.quantile <= 1):
             raise CorrectorError(
                 "guard: kappa must be at least 1, limit not negative, quantile above 0 and at most 1"
             )
 
+    def check(self, states: int, predicts: bool) -> None:
+        """Raises CorrectorError unless there is a unit for each of so many states, and for their prediction where there is one."""
+        for name, values in (("atol", self.atol), ("rtol", self.rtol)):
+            if len(values) != states:
+                raise CorrectorError(
+                    f"its guard's {name} needs a number for each of {states} states, got {len(values)}"
+                )
+        if len(self.ahead_atol) != (states if predicts else 0):
+            what = (
+                f"a number for each of {states} states"
+                if predicts
+                else "to be empty, the method predicts nothing"
+            )
+            raise CorrectorError(f"its guard's ahead_atol needs {what}")
 
-def open_guard(norm: str = "max", substeps: int = 2) -> Guard:
+
+def open_guard(states: int, norm: str = "max", substeps: int = 2) -> Guard:
     """For a corrector whose threshold is still to be found: nothing would be accepted."""
-    return Guard(0.0, norm, 1.0, 1.0, (1.0,) * STATES, (0.0,) * STATES, substeps)
+    return Guard(0.0, norm, 1.0, 1.0, (1.0,) * states, (0.0,) * states, substeps)

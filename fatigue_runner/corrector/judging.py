@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.corrector import samples
 from fatigue_runner.integrators import MODES, Ensemble, Integrator, simulate
 
@@ -69,7 +68,7 @@ def validate(corrector: Corrector, recipe: Recipe, turbine: Turbine) -> dict[str
         out |= {f"nrmse_{name}": float(np.median(errors)), f"nrmse_{name}_worst": float(errors.max())}
     out["acceptance"] = accepted  # of the last, the hybrid
     left = recipe.residual(corrector, turbine, judge.ensemble.winds, judge.references)
-    out |= {f"residual_{name}": float(value) for name, value in zip(STATE_NAMES, left, strict=True)}
+    out |= {f"residual_{name}": float(value) for name, value in zip(turbine.layout.names, left, strict=True)}
     return {name: value for name, value in out.items() if np.isfinite(value)}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.corrector import features
-from fatigue_runner.corrector.coordinates import accelerations
+from fatigue_runner.corrector.coordinates import slopes
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import Ensemble, Integrator, simulate
 from fatigue_runner.integrators import method as find_method
@@ -48,11 +48,11 @@ class Samples:
     @property
     def state(self) -> Array:
         """(n, states) at the step's start."""
-        return self.raw[:, 1 : 1 + features.STATES]
+        return self.raw[:, 1 : 1 + self.plain.shape[1]]
 
-    def multiplied(self, factors: tuple[str, ...] = ()) -> Array:
-        """(n, k) stage-aware rows, and all of them times the row of each factor."""
-        more = [self.rows * self.rows[:, row : row + 1] for row in features.factor_rows(factors)]
+    def multiplied(self, factors: tuple[int, ...]) -> Array:
+        """(n, k) stage-aware rows, and all of them times each of the rows `factors`."""
+        more = [self.rows * self.rows[:, row : row + 1] for row in factors]
         return np.concatenate([self.rows, *more], axis=1) if more else self.rows
 
 
@@ -101,7 +101,8 @@ def single_steps(
     tableaux: Any = find_method(method), find_method(accurate)
     own, finer = (runge_kutta_arrays(tableau) for tableau in tableaux)
     stages = len(own.stages.c)
-    width, seen = len(features.stage_aware(stages)), len(features.raw())
+    layout = turbine.layout
+    width, seen = len(features.stage_aware(layout, stages)), len(features.raw(layout))
     rows, raw = np.empty((len(x), width * LANES)), np.empty((len(x), seen * LANES))
     plain, exact = np.empty_like(x), np.empty_like(x)
     data = turbine.kernel_data(0.0)
@@ -112,8 +113,8 @@ def single_steps(
     return Samples(
         from_groups(rows, width, n).T.copy(),
         from_groups(raw, seen, n).T.copy(),
-        from_groups(plain, features.STATES, n).T.copy(),
-        from_groups(exact, features.STATES, n).T.copy(),
+        from_groups(plain, layout.size, n).T.copy(),
+        from_groups(exact, layout.size, n).T.copy(),
         pieces,
     )
 
@@ -165,7 +166,6 @@ def along(
     """
     rng = np.random.Generator(np.random.PCG64(seed))
     scale = np.std(np.concatenate([run.state for run in runs]), axis=0)
-    ratio = turbine.parameters["g_ratio"]
     states, pieces, behind = [], [], []
     count = pieces_of(winds, step, output_step(step, history))
     for wind, run in zip(winds, runs, strict=True):
@@ -177,20 +177,20 @@ def along(
         pick = rng.integers(history, last, per_wind)
         x = run.state[pick].copy()
         moved = slice(0, None, 2)
-        x[moved] += moves(rng, x[moved].shape, scale, perturbation, ratio)
+        x[moved] += moves(rng, x[moved].shape, scale, perturbation, turbine)
         states.append(x)
         pieces.append(wind_pieces(wind, run.time[pick], step, count))
         if history:
-            slopes = step * accelerations(turbine, run.state, run.wind)
-            looked = np.concatenate([slopes[pick - i] for i in range(1, history + 1)], axis=1)
+            found = step * slopes(turbine, run.state, run.wind)
+            looked = np.concatenate([found[pick - i] for i in range(1, history + 1)], axis=1)
             looked[moved] += (
-                rng.standard_normal(looked[moved].shape) * np.tile(slopes.std(axis=0), history) * perturbation
+                rng.standard_normal(looked[moved].shape) * np.tile(found.std(axis=0), history) * perturbation
             )
             behind.append(looked)
-    found = single_steps(turbine, method, step, np.concatenate(states), np.concatenate(pieces))
+    out = single_steps(turbine, method, step, np.concatenate(states), np.concatenate(pieces))
     if history:
-        found.rows = np.concatenate([found.rows, np.concatenate(behind)], axis=1)
-    return found
+        out.rows = np.concatenate([out.rows, np.concatenate(behind)], axis=1)
+    return out
 
 
 def output_step(step: float, history: int) -> float:
@@ -198,11 +198,14 @@ def output_step(step: float, history: int) -> float:
     return step if history else GRID
 
 
-def moves(rng: np.random.Generator, shape: tuple[int, ...], scale: Array, size: float, ratio: float) -> Array:
+def moves(
+    rng: np.random.Generator, shape: tuple[int, ...], scale: Array, size: float, turbine: Turbine
+) -> Array:
     """Perturbations of states that keep the azimuth, and the generator's angle and speed near the rotor's."""
+    layout, ratio = turbine.layout, turbine.gearbox_ratio
     move = rng.standard_normal(shape) * scale * size
-    move[:, features.ROTOR] = 0.0
-    move[:, features.GENERATOR] = ratio * 1e-3 * size * rng.standard_normal(shape[0])
+    move[:, layout.rotor] = 0.0
+    move[:, layout.generator] = ratio * 1e-3 * size * rng.standard_normal(shape[0])
     slip = 1e-2 * size * rng.standard_normal(shape[0])
-    move[:, features.GENERATOR_SPEED] = ratio * (move[:, features.ROTOR_SPEED] + slip)
+    move[:, layout.generator_speed] = ratio * (move[:, layout.rotor_speed] + slip)
     return move

@@ -71,6 +71,7 @@ def collect(
 ) -> Steps:
     """Steps from random places of true trajectories `runs`, sampled every `step` [s]; learned_ahead (states, rows): part of the predictor;
     damping [1/s]: see `multi_blade.linear`."""
+    layout = turbine.layout
     rng = np.random.Generator(np.random.PCG64(seed))
     ahead_base, plain_base = method.matrices(turbine, step, 0.0, past, damping)
     ahead_all = ahead_base if learned_ahead is None else ahead_base + learned_ahead
@@ -92,24 +93,25 @@ def collect(
     for back in range(WARM, -1, -1):
         x = state(back)
         pressure = np.stack([wind(back, place) for place in (0.0, 0.5, 1.0)], axis=1)
-        turn = turn_of(x)
+        turn = turn_of(layout, x)
         seen = rows(turbine, x, pressure, parts, turn)
-        change = from_fixed(seen @ ahead_all.T, turn)
+        change = from_fixed(layout, seen @ ahead_all.T, turn)
         part = nonlinear_part(turbine, x + change, pressure[:, 2], damping)
         parts = [part, *parts]
         if back:
             parts = parts[:past]
-    whole = np.concatenate([seen, parts_to_fixed(parts[0], turn)], axis=1)
-    return Steps(
-        seen, whole, x + from_fixed(seen @ ahead_base.T, turn), x + from_fixed(whole @ plain_base.T, turn), state(-1), turn
-    )  # fmt: skip
+    whole = np.concatenate([seen, parts_to_fixed(layout, parts[0], turn)], axis=1)
+    ahead = x + from_fixed(layout, seen @ ahead_base.T, turn)
+    return Steps(seen, whole, ahead, x + from_fixed(layout, whole @ plain_base.T, turn), state(-1), turn)
 
 
 def rows(turbine: Turbine, x: Array, wind: Array, parts: list[Array], turn: Turn) -> Array:
     """(n, rows) what a predictor sees: states (n, states), wind (n, 3, signals) at start, middle and end, earlier parts, the newest
     first."""
-    state = relative_to_fixed(relative(x, turbine.parameters["g_ratio"]), turn)
+    layout = turbine.layout
+    state = relative_to_fixed(layout, relative(layout, x, turbine.gearbox_ratio), turn)
     blown = wind.copy()
-    blown[:, :, 1:] *= wind[:, :, :1]
-    earlier = [parts_to_fixed(part, turn) for part in parts]
+    # the wind that the shears add at the rotor's edge; other signals as they are
+    blown[:, :, 1:3] *= wind[:, :, :1]
+    earlier = [parts_to_fixed(layout, part, turn) for part in parts]
     return np.concatenate([np.ones((len(x), 1)), state, blown.reshape(len(x), -1), *earlier], axis=1)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fatigue_runner.corrector.features import STATES
 from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.samples import Samples, single_steps
 from fatigue_runner.errors import InputError
@@ -105,6 +104,6 @@ def limit_of(
     usual = np.sqrt((difference**2).mean(axis=0))
     # never 0: a constant wind leaves states at rest
     atol = np.maximum(usual, 1e-15 * (1 + np.abs(state).max(axis=0)))
-    guard = Guard(0.0, norm, kappa, quantile, tuple(atol.tolist()), (rtol,) * STATES, substeps)
+    guard = Guard(0.0, norm, kappa, quantile, tuple(atol.tolist()), (rtol,) * len(atol), substeps)
     size = distances(difference, state, fallback, guard)
     return replace(guard, limit=kappa * float(np.quantile(size, quantile)))

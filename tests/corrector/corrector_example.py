@@ -43,7 +43,8 @@ def training_samples(method="heun", step=0.02, history=0):
 @cache
 def trained(method="heun", step=0.02, factors=(), history=0, substeps=None) -> Corrector:
     found, binding = training_samples(method, step, history), Binding.to(turbine(), method, step)
-    weights = fit.affine(found.multiplied(factors), found.defect) / binding.size
+    rows = found.multiplied(features.factor_rows(turbine().layout, factors))
+    weights = fit.affine(rows, found.defect) / binding.size
     learned = StageMap(weights, factors=factors, history=history)
     guard = threshold.from_training_set(learned, binding, turbine(), found, substeps=substeps)
     return Corrector("example", "affine", binding, learned, guard, (6.0, 9.0))
@@ -60,8 +61,9 @@ def with_weights(corrector: Corrector, weights) -> Corrector:
 def network(raw: bool, activation="isru", seed=0) -> Corrector:
     """Random layers of moderate size, for comparing the compiled network with numpy's."""
     rng = np.random.default_rng(seed)
-    inputs = len(features.raw() if raw else features.stage_aware(2)) - 1
-    sizes = (inputs, 13, 24, features.STATES)
+    layout = turbine().layout
+    inputs = len(features.raw(layout) if raw else features.stage_aware(layout, 2)) - 1
+    sizes = (inputs, 13, 24, layout.size)
     layers = tuple(rng.normal(size=(b, a + 1)) / (10 * a) for a, b in itertools.pairwise(sizes))
     learned = RawNetwork(layers, activation) if raw else StageMap(None, layers, activation)
     return replace(trained(), family="test", map=learned)

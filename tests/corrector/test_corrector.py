@@ -96,7 +96,7 @@ def test_a_corrector_that_looks_back_sees_the_slopes_of_the_steps_before():
     pieces = np.zeros((1, 1, 4, 3))
     pieces[0, 0, 0] = 7.4, 0.1, 0.02
     now = samples.single_steps(turbine(), "rk4", 0.1, ran.state[1:2], pieces)
-    before = 0.1 * coordinates.accelerations(turbine(), ran.state, ran.wind)[0]
+    before = 0.1 * coordinates.slopes(turbine(), ran.state, ran.wind)[0]
     now.rows = np.concatenate([now.rows, before[None]], axis=1)
     assert ran.state[2] == pytest.approx((now.plain + corrector.predict(now))[0], rel=1e-10, abs=1e-10)
     assert np.abs(corrector.predict(now)).max() > 1e-7
@@ -272,9 +272,9 @@ class TestSamples:
             collect("heun", 0.02, [UNSEEN], 3.0, 20, 1e-5, 0, initial=start() * 1e5)
 
     def test_features_are_named_one_by_one(self):
-        assert training_samples().rows.shape[1] == len(features.stage_aware(2))
+        assert training_samples().rows.shape[1] == len(features.stage_aware(turbine().layout, 2))
         looking_back = training_samples("rk4", 0.1, 1)
-        assert looking_back.rows.shape[1] == len(features.stage_aware(4, 1))
+        assert looking_back.rows.shape[1] == len(features.stage_aware(turbine().layout, 4, 1))
 
 
 def test_the_limit_is_kappa_times_the_largest_distance_of_the_training_set():

@@ -83,7 +83,7 @@ def rewritten(path, change):
             "unknown feature factor 'sin_azimut'; did you mean 'sin_azimuth'",
         ),
         (lambda h, t: h.update(kind="rawer"), "do not exist"),
-        (lambda h, t: h["guard"].update(atol=[0.0] * 16), "16 positive numbers"),
+        (lambda h, t: h["guard"].update(atol=[0.0] * 16), "atol needs positive numbers"),
         (lambda h, t: h["guard"].update(norm="euclid"), "norm must be one of max, rms"),
         (lambda h, t: h["guard"].update(kappa=0.5), "kappa must be at least 1"),
         (lambda h, t: h.update(history=9), "look back 9 steps do not exist"),
@@ -101,8 +101,9 @@ def test_a_damaged_header_or_weight_is_refused_with_what_is_wrong(tmp_path, chan
 
 
 def test_a_guard_needs_an_absolute_tolerance_for_every_state():
-    with pytest.raises(CorrectorError, match="atol needs 16 positive numbers"):
-        Guard(1.0, "max", 1.0, 1.0, (1.0,) * 15, (0.0,) * 16)
+    short = Guard(1.0, "max", 1.0, 1.0, (1.0,) * 15, (0.0,) * 16, 2)
+    with pytest.raises(CorrectorError, match="its guard's atol needs a number for each of 16 states, got 15"):
+        replace(trained(), guard=short)
 
 
 def test_a_name_finds_the_file_of_the_given_folder_and_an_unknown_one_the_nearest(tmp_path):

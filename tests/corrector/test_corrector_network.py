@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from fatigue_runner.cli import app
 from fatigue_runner.corrector import load, rollouts, samples
 from fatigue_runner.corrector.families import affine_net
-from fatigue_runner.corrector.features import DRIVE
+from fatigue_runner.corrector.features import drive
 from fatigue_runner.corrector.recipe import Progress
 from fatigue_runner.corrector.train import train_file
 from fatigue_runner.errors import InputError
@@ -55,7 +55,8 @@ def test_the_network_leaves_less_of_unseen_defects_than_the_affine_map_below_it(
     unseen = collect("heun", 0.05, winds, 10.0, 200, 1e-5, 7, initial=start)
     affine = with_map(corrector, layers=(), activation="identity")
     left = [
-        np.median(np.abs(c.predict(unseen) - unseen.defect), axis=0)[list(DRIVE)] for c in (affine, corrector)
+        np.median(np.abs(c.predict(unseen) - unseen.defect), axis=0)[list(drive(turbine().layout))]
+        for c in (affine, corrector)
     ]
     assert np.median(left[1] / left[0]) < 0.9
 
@@ -109,7 +110,9 @@ def test_training_leaves_the_callers_random_numbers_and_threads_alone():
     torch.manual_seed(5)
     settings = affine_net.NetworkRecipe(hidden=[4], epochs=1)
     size = trained().binding.size
-    affine_net.add(trained().map, size, training_samples(), training_samples(), settings, DRIVE)
+    affine_net.add(
+        trained().map, size, training_samples(), training_samples(), settings, drive(turbine().layout)
+    )
     assert torch.rand(1).item() == expected
     assert torch.get_num_threads() == threads
 

@@ -19,21 +19,36 @@ from fatigue_runner.corrector.train import read_recipe, train
 from fatigue_runner.integrators import simulate_block
 from fatigue_runner.wind import ConstantWind
 
-# A family in one file: the defect is taken to be the mean of the training set's, with a map of its own.
+# A family in one file: the defect is taken to be the mean of the training set's, with a map and compiled code of its own.
 TOY = """
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from fatigue_runner.corrector import features, samples
+from fatigue_runner.compiled import INLINE, njit
+from fatigue_runner.corrector import samples
 from fatigue_runner.corrector.maps import Map
 from fatigue_runner.corrector.recipe import GuardRecipe, Learned, Recipe
 from fatigue_runner.corrector.threshold import from_training_set
-from fatigue_runner.integrators.dense import pack
-from fatigue_runner.integrators.protocol import StageMapData
+from fatigue_runner.integrators.choice import compiled_for
+from fatigue_runner.integrators.correction import correction
+from fatigue_runner.layout import T2B1I1CG, Layout
+from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.model import width
 from fatigue_runner.wind import ConstantWind
+
+
+class MeanDefectData(NamedTuple):
+    defect: np.ndarray
+
+
+@compiled_for(correction, MeanDefectData)
+@njit(**INLINE)
+def _add_mean(learned, model, x, k, stage_rows, h, start, middle, end, seen, hidden, out):
+    for m in range(width(model)):
+        out[m] = learned.defect[m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +56,10 @@ class MeanDefect(Map):
     kind = "mean-defect"
     methods = "runge-kutta"
     mean: np.ndarray
+    layout: Layout = T2B1I1CG
 
     def data(self, binding, turbine, pitch):
-        weights = np.zeros((features.STATES, len(features.stage_aware(binding.found.evaluations_per_step))))
-        weights[:, 0] = self.mean * binding.size
-        nothing = np.zeros(0)
-        return StageMapData(
-            turbine.parameters["g_ratio"], 0, nothing.astype(int), pack(weights)[0], nothing, np.array([0]), 0
-        )
+        return MeanDefectData(np.repeat(self.mean * binding.size, LANES))
 
     def check(self, method, guard):
         pass
@@ -66,8 +77,8 @@ class MeanDefect(Map):
         return {}
 
     @classmethod
-    def read(cls, header, tensors):
-        return cls(tensors["mean"])
+    def read(cls, header, tensors, layout):
+        return cls(tensors["mean"], layout)
 
 
 class MeanRecipe(Recipe):
@@ -92,7 +103,11 @@ RECIPE = "name: flat\nfamily: mean\nmethod: heun\nstep: 0.02\nspeeds: [7, 8]\n"
 
 @pytest.fixture
 def toy(tmp_path, monkeypatch):
-    """The toy family's file in a folder that the package looks into."""
+    """The toy family's file in a folder that the package looks into.
+
+    What is compiled for it must not stay in the cache: its index would name a module that no other process has.
+    """
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", lambda *_: None)
     (tmp_path / "toy.py").write_text(TOY)
     monkeypatch.setattr(families, "__path__", [*families.__path__, str(tmp_path)])
     families.find_all()

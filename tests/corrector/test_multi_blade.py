@@ -28,7 +28,8 @@ def test_compiled_steps_are_what_the_matrices_of_the_artefact_say():
         0
     ]
     base_ahead, base = method("etdabm3").matrices(turbine(), h, 0.0, past, corrector.damping)
-    size, factors = corrector.binding.size, features.multi_blade_factors(corrector.map.factors)
+    layout = turbine().layout
+    size, factors = corrector.binding.size, features.multi_blade_factor_rows(layout, corrector.map.factors)
     ahead, whole = corrector.map.predictor * size, corrector.map.linear * size
     whole[:, : base.shape[1]] += base
 
@@ -42,11 +43,11 @@ def test_compiled_steps_are_what_the_matrices_of_the_artefact_say():
         turn = np.cos(x[6:7]), np.sin(x[6:7])
         blown = blowing.at(np.array([n, n + 0.5, n + 1]) * h)[None]
         seen = steps.rows(turbine(), x[None], blown, parts[:past], turn)
-        predicted = x + coordinates.from_fixed(seen @ (base_ahead + ahead).T, turn)[0]
+        predicted = x + coordinates.from_fixed(layout, seen @ (base_ahead + ahead).T, turn)[0]
         parts.insert(0, part(predicted, (n + 1) * h))
-        full = np.concatenate([seen, coordinates.parts_to_fixed(parts[0], turn)], axis=1)
+        full = np.concatenate([seen, coordinates.parts_to_fixed(layout, parts[0], turn)], axis=1)
         full = np.concatenate([full, *(full * full[:, [i]] for i in factors)], axis=1)
-        x = x + coordinates.from_fixed(full @ whole.T, turn)[0]
+        x = x + coordinates.from_fixed(layout, full @ whole.T, turn)[0]
         assert np.abs(compiled.state[n + 1] - x).max() < 1e-9 * np.abs(x).max()
 
 
@@ -124,7 +125,7 @@ def test_a_damaged_map_is_refused_with_what_is_wrong(change, message):
 
 def test_a_guard_without_units_for_the_predictor_and_another_method_are_refused():
     good = shipped()
-    with pytest.raises(CorrectorError, match="ahead_atol needs 16 positive numbers"):
+    with pytest.raises(CorrectorError, match="ahead_atol needs a number for each of 16 states"):
         replace(good, guard=replace(good.guard, ahead_atol=(1.0,) * 15))
     with pytest.raises(CorrectorError, match="'multi-blade' do not exist for rk4"):
         replace(good, binding=replace(good.binding, method="rk4"))

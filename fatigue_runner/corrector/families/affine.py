@@ -77,8 +77,9 @@ class AffineRecipe(ClosedForm):
 
         def fit(seen: samples.Samples) -> StageMap:
             factors = tuple(self.factors)
-            weights = self.solve(seen.multiplied(factors), seen.defect) / size
-            return StageMap(weights, factors=factors, history=self.history)
+            rows = seen.multiplied(features.factor_rows(turbine.layout, factors))
+            weights = self.solve(turbine.layout, rows, seen.defect) / size
+            return StageMap(weights, factors=factors, history=self.history, layout=turbine.layout)
 
         learned = fit(found)
         facts: dict[str, Any] = {"winds": len(winds), "seed": self.seed}
@@ -103,7 +104,13 @@ class AffineRecipe(ClosedForm):
 
     def _open(self, turbine: Turbine, learned: StageMap) -> Corrector:
         """A corrector for enhanced runs: its threshold is still to be found."""
-        return Corrector(self.name, self.family, self.bound_to(turbine), learned, open_guard(self.guard.norm))
+        return Corrector(
+            self.name,
+            self.family,
+            self.bound_to(turbine),
+            learned,
+            open_guard(turbine.layout.size, self.guard.norm),
+        )
 
     def _judge(self, turbine: Turbine) -> Callable[[StageMap], float]:
         """Median error of a map's enhanced runs under the validation winds."""

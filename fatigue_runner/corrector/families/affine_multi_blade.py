@@ -47,13 +47,13 @@ class MultiBladeRecipe(ClosedForm):
     @classmethod
     def _factors_of_the_kind(cls, value: list[str]) -> list[str]:
         try:
-            features.multi_blade_factors(tuple(value))
+            features.check_multi_blade_factors(tuple(value))
         except InputError as error:
             raise problem(str(error)) from None
         return value
 
     def train(self, turbine: Turbine, progress: Progress) -> Learned:
-        binding = self.bound_to(turbine)
+        binding, layout = self.bound_to(turbine), turbine.layout
         method, factors, damping = binding.found, tuple(self.factors), self.generator_damping
         winds = self.training.build()
         progress.say(f"reference trajectories under {len(winds)} winds")
@@ -65,19 +65,21 @@ class MultiBladeRecipe(ClosedForm):
         )  # fmt: skip
         progress.say(f"fitting the predictor to {len(winds) * self.samples} steps")
         found = sampled(None)
-        ahead = self.solve(found.ahead_rows, to_fixed(found.ahead_defect, found.turn))
+        ahead = self.solve(layout, found.ahead_rows, to_fixed(layout, found.ahead_defect, found.turn))
         progress.say("fitting the corrector")
         found = sampled(ahead)
-        seen = found.multiplied(features.multi_blade_factors(factors))
-        learned = self.solve(seen, to_fixed(found.defect, found.turn))
+        seen = found.multiplied(features.multi_blade_factor_rows(layout, factors))
+        learned = self.solve(layout, seen, to_fixed(layout, found.defect, found.turn))
         guard = self._guard(
             found,
-            from_fixed(found.ahead_rows @ ahead.T, found.turn),
-            from_fixed(seen @ learned.T, found.turn),
+            from_fixed(layout, found.ahead_rows @ ahead.T, found.turn),
+            from_fixed(layout, seen @ learned.T, found.turn),
         )
         speeds = np.concatenate([run.wind[:, 0] for run in runs])
         facts: dict[str, Any] = {"samples": len(seen), "winds": len(winds), "seed": self.seed}
-        matrices = MultiBladeMap(ahead / binding.size, learned / binding.size, factors, self.history, damping)
+        matrices = MultiBladeMap(
+            ahead / binding.size, learned / binding.size, factors, self.history, damping, layout
+        )
         return Learned(matrices, guard, (float(speeds.min()), float(speeds.max())), facts)
 
     def _guard(self, found: steps.Steps, moved: Array, change: Array) -> Guard:

@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from fatigue_runner.corrector.families.affine import AffineRecipe
-from fatigue_runner.corrector.features import DRIVE
+from fatigue_runner.corrector.features import drive
 from fatigue_runner.corrector.fit import KNEE
 from fatigue_runner.corrector.maps import StageMap
 from fatigue_runner.corrector.network.pairs import Pairs
@@ -69,7 +69,9 @@ class AffineNetRecipe(AffineRecipe):
         unseen = self.validation.build()
         judged = self.sampled(turbine, unseen, self.validation.duration, self.judging_seed)
         size = self.bound_to(turbine).size
-        learned, facts = add(made.map, size, made.samples, judged, self.network, DRIVE, progress)
+        learned, facts = add(
+            made.map, size, made.samples, judged, self.network, drive(turbine.layout), progress
+        )
         return self.guarded(turbine, replace(made, map=learned, facts=made.facts | facts), progress)
 
 

@@ -16,8 +16,9 @@ from pydantic import Field, field_validator, model_validator
 
 from fatigue_runner.corrector import features, fit
 from fatigue_runner.corrector.recipe import Array, Recipe, Winds
-from fatigue_runner.errors import did_you_mean
+from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.section import problem
+from fatigue_runner.layout import Layout
 
 
 class ClosedForm(Recipe):
@@ -31,18 +32,19 @@ class ClosedForm(Recipe):
     ridge: float = Field(default=1e-12, gt=0, le=1)
     seed: int = Field(default=0, ge=0)
 
-    def solve(self, rows: Array, defects: Array) -> Array:
+    def solve(self, layout: Layout, rows: Array, defects: Array) -> Array:
         """(states, k) weights of the fit that the recipe asks for: rows (n, k), defects (n, states)."""
         if self.fit == "robust":
-            return fit.robust(rows, defects, self.ridge, features.DRIVE)
+            return fit.robust(rows, defects, self.ridge, features.drive(layout))
         return fit.affine(rows, defects, self.ridge)
 
     @field_validator("factors")
     @classmethod
     def _factors_exist(cls, value: list[str]) -> list[str]:
-        for name in value:
-            if name not in features.FACTORS:
-                raise problem(f"unknown feature factor {name!r}{did_you_mean(name, features.FACTORS)}")
+        try:
+            features.check_factors(tuple(value))
+        except InputError as error:
+            raise problem(str(error)) from None
         return value
 
     @model_validator(mode="after")

@@ -133,7 +133,7 @@ class MlpRecipe(Recipe):
             "initial": self.initial, "duration": self.duration,
             "train_speeds": list(self.speeds.train), "validation_speeds": list(self.speeds.validation),
         }  # fmt: skip
-        learned = RawNetwork(layers, self.training.activation)
+        learned = RawNetwork(layers, self.training.activation, turbine.layout)
         guard = from_training_set(
             learned, self.bound_to(turbine), turbine, train, **self.guard.threshold, substeps=0
         )
@@ -194,6 +194,5 @@ def along_trajectories(
     pieces = np.concatenate([wind_pieces(w, run.time[:-1], step) for w, run in zip(winds, runs, strict=True)])
     sets = [states]
     rng, scale = np.random.Generator(np.random.PCG64(seed)), np.std(states, axis=0)
-    ratio = turbine.parameters["g_ratio"]
-    sets += [states + moves(rng, states.shape, scale, perturbation, ratio) for _ in range(perturbed)]
+    sets += [states + moves(rng, states.shape, scale, perturbation, turbine) for _ in range(perturbed)]
     return single_steps(turbine, method, step, np.concatenate(sets), np.concatenate([pieces] * len(sets)))

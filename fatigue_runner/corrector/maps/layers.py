@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.corrector.errors import CorrectorError
-from fatigue_runner.corrector.features import STATES
 
 Array = NDArray[np.float64]
 Layers = tuple[Array, ...]
@@ -27,8 +26,8 @@ def apply(layers: Sequence[Array], inputs: Array, activation: str = "relu") -> A
     return value
 
 
-def check(layers: Layers, inputs: int, activation: str) -> None:
-    """Raises CorrectorError unless the layers lead from `inputs` values to a state."""
+def check(layers: Layers, inputs: int, outputs: int, activation: str) -> None:
+    """Raises CorrectorError unless the layers lead from `inputs` to `outputs` values."""
     if activation not in ACTIVATIONS:
         raise CorrectorError(f"activation {activation!r} does not exist; known: {', '.join(ACTIVATIONS)}")
     width = inputs
@@ -36,8 +35,8 @@ def check(layers: Layers, inputs: int, activation: str) -> None:
         if layer.ndim != 2 or layer.shape[1] != width + 1 or layer.shape[0] > MOST_UNITS:
             raise CorrectorError(f"layer {number} has shape {layer.shape}, it needs {width + 1} inputs")
         width = layer.shape[0]
-    if layers and width != STATES:
-        raise CorrectorError(f"the last layer has {width} outputs instead of {STATES}")
+    if layers and width != outputs:
+        raise CorrectorError(f"the last layer has {width} outputs instead of {outputs}")
 
 
 def packed(layers: Layers, activation: str, size: float) -> tuple[Array, NDArray[np.int64], int]:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fatigue_runner.corrector.binding import Binding
     from fatigue_runner.corrector.guard import Guard
     from fatigue_runner.integrators.contract import Method
+    from fatigue_runner.layout import Layout
     from fatigue_runner.trajectory import Trajectory
     from fatigue_runner.turbine import Turbine
 
@@ -49,6 +50,11 @@ class Map(ABC):
         super().__init_subclass__(**options)
         if "kind" in cls.__dict__:
             MAPS[cls.kind] = cls
+
+    @property
+    @abstractmethod
+    def layout(self) -> Layout:
+        """The states and signals that it sees and gives."""
 
     # --- what the integrators ask, see integrators/protocol.py ---
 
@@ -108,7 +114,7 @@ class Map(ABC):
 
     @classmethod
     @abstractmethod
-    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array]) -> Self:
+    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array], layout: Layout) -> Self:
         """The map of a file. Raises KeyError for what is missing."""
 
     @property

@@ -14,7 +14,7 @@ from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.maps.map import Array, Map
 from fatigue_runner.integrators import multi_blade
 from fatigue_runner.integrators.protocol import MultiBladeData
-from fatigue_runner.layout import T2B1I1CG
+from fatigue_runner.layout import T2B1I1CG, Layout
 
 if TYPE_CHECKING:
     from fatigue_runner.corrector.binding import Binding
@@ -43,35 +43,34 @@ class MultiBladeMap(Map):
     factors: tuple[str, ...] = ()
     history: int = 0
     damping: float = 0.0
+    layout: Layout = T2B1I1CG
 
     @property
     def past(self) -> int:
-        return (self.predictor.shape[1] - multi_blade.past_row(T2B1I1CG)) // multi_blade.parts(T2B1I1CG)
+        return (self.predictor.shape[1] - multi_blade.past_row(self.layout)) // multi_blade.parts(self.layout)
 
     def check(self, method: Method, guard: Guard) -> None:
-        features.multi_blade_factors(self.factors)
+        guard.check(self.layout.size, predicts=True)
+        features.check_multi_blade_factors(self.factors)
         if guard.low:
             raise CorrectorError("one of an exponential method has no bounds")
-        if len(guard.ahead_atol) != features.STATES or not all(a > 0 for a in guard.ahead_atol):
-            raise CorrectorError(
-                f"ahead_atol needs {features.STATES} positive numbers, to guard the predictor"
-            )
         if not 0 <= self.damping < MOST_DAMPING:
             raise CorrectorError(f"the generator's damping must be a number from 0 to {MOST_DAMPING:g} 1/s")
         if not 0 <= self.history <= multi_blade.MOST_PAST:
             raise CorrectorError(
                 f"one of an exponential method looks back {multi_blade.MOST_PAST} steps at most"
             )
-        rows = multi_blade.base_rows(T2B1I1CG, past_of(method, self.history))
-        wanted = (
-            (features.STATES, rows - multi_blade.parts(T2B1I1CG)),
-            (features.STATES, rows * (1 + len(self.factors))),
-        )
+        size, rows = self.layout.size, multi_blade.base_rows(self.layout, past_of(method, self.history))
+        wanted = (size, rows - multi_blade.parts(self.layout)), (size, rows * (1 + len(self.factors)))
         if (self.predictor.shape, self.linear.shape) != wanted:
             raise CorrectorError(
                 f"weights of shape {self.predictor.shape} and {self.linear.shape} do not fit {method.name}'s "
                 f"features, which need {wanted[0]} and {wanted[1]}"
             )
+
+    @property
+    def _factor_rows(self) -> tuple[int, ...]:
+        return features.multi_blade_factor_rows(self.layout, self.factors)
 
     def data(self, binding: Binding, turbine: Turbine, pitch: float) -> MultiBladeData:
         from fatigue_runner.integrators.dense import pack
@@ -81,7 +80,7 @@ class MultiBladeMap(Map):
         whole = self.linear * binding.size
         whole[:, : plain.shape[1]] += plain
         learned_ahead = ahead + self.predictor * binding.size
-        rows = np.array(features.multi_blade_factors(self.factors), dtype=np.int64)
+        rows = np.array(self._factor_rows, dtype=np.int64)
         return MultiBladeData(pack(learned_ahead)[0], pack(ahead)[0], pack(whole)[0], pack(plain)[0], rows)
 
     def sample(
@@ -94,8 +93,8 @@ class MultiBladeMap(Map):
 
     def predict(self, sampled: steps.Steps, size: float) -> Array:
         """Of the corrector; what the predictor adds is part of the plain results."""
-        seen = sampled.multiplied(features.multi_blade_factors(self.factors))
-        return from_fixed(seen @ (self.linear * size).T, sampled.turn)
+        seen = sampled.multiplied(self._factor_rows)
+        return from_fixed(self.layout, seen @ (self.linear * size).T, sampled.turn)
 
     def tensors(self) -> dict[str, Array]:
         return {"predictor": self.predictor, "linear": self.linear}
@@ -104,9 +103,9 @@ class MultiBladeMap(Map):
         return {"factors": self.factors, "history": self.history, "damping": self.damping}
 
     @classmethod
-    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array]) -> Self:
+    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array], layout: Layout) -> Self:
         return cls(
-            tensors["predictor"], tensors["linear"], tuple(header["factors"]), header["history"], header["damping"]
+            tensors["predictor"], tensors["linear"], tuple(header["factors"]), header["history"], header["damping"], layout
         )  # fmt: skip
 
     @property

@@ -11,6 +11,7 @@ from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.maps import layers as dense
 from fatigue_runner.corrector.maps.map import Array, Map
 from fatigue_runner.integrators.protocol import RawNetworkData
+from fatigue_runner.layout import T2B1I1CG, Layout
 
 if TYPE_CHECKING:
     from fatigue_runner.corrector.binding import Binding
@@ -29,16 +30,16 @@ class RawNetwork(Map):
 
     layers: dense.Layers
     activation: str = "relu"
+    layout: Layout = T2B1I1CG
 
     def check(self, method: Method, guard: Guard) -> None:
-        inputs = len(features.raw()) - 1
+        guard.check(self.layout.size, predicts=False)
+        inputs = len(features.raw(self.layout)) - 1
         if not self.layers:
             raise CorrectorError("a network without layers")
-        if guard.ahead_atol:
-            raise CorrectorError(f"{method.name} predicts nothing, so ahead_atol must be empty")
         if guard.low and len(guard.low) != inputs:
             raise CorrectorError(f"its guard bounds {len(guard.low)} features, there are {inputs}")
-        dense.check(self.layers, inputs, self.activation)
+        dense.check(self.layers, inputs, self.layout.size, self.activation)
 
     def data(self, binding: Binding, turbine: Turbine, pitch: float) -> RawNetworkData:
         return RawNetworkData(*dense.packed(self.layers, self.activation, binding.size))
@@ -61,5 +62,5 @@ class RawNetwork(Map):
         return {"activation": self.activation, "layers": len(self.layers)}
 
     @classmethod
-    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array]) -> Self:
-        return cls(dense.read(header["layers"], tensors), header["activation"])
+    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array], layout: Layout) -> Self:
+        return cls(dense.read(header["layers"], tensors), header["activation"], layout)

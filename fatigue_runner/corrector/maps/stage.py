@@ -13,6 +13,7 @@ from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.maps import layers as dense
 from fatigue_runner.corrector.maps.map import Array, Map
 from fatigue_runner.integrators.protocol import StageMapData
+from fatigue_runner.layout import T2B1I1CG, Layout
 
 if TYPE_CHECKING:
     from fatigue_runner.corrector.binding import Binding
@@ -35,16 +36,16 @@ class StageMap(Map):
     activation: str = "identity"
     factors: tuple[str, ...] = ()
     history: int = 0
+    layout: Layout = T2B1I1CG
 
     def check(self, method: Method, guard: Guard) -> None:
-        features.factor_rows(self.factors)
+        guard.check(self.layout.size, predicts=False)
+        features.check_factors(self.factors)
         if not 0 <= self.history <= features.MOST_HISTORY:
             raise CorrectorError(f"features {self.kind!r} that look back {self.history} steps do not exist")
         if self.history and not guard.substeps:
             raise CorrectorError("one that looks back starts with substeps; its guard must have them")
-        if guard.ahead_atol:
-            raise CorrectorError(f"{method.name} predicts nothing, so ahead_atol must be empty")
-        base = len(features.stage_aware(method.evaluations_per_step, self.history))
+        base = len(features.stage_aware(self.layout, method.evaluations_per_step, self.history))
         rows = base * (1 + len(self.factors))
         if rows > features.MOST_ROWS:
             raise CorrectorError(f"{rows} features are more than {features.MOST_ROWS}")
@@ -52,19 +53,23 @@ class StageMap(Map):
             raise CorrectorError(f"its guard bounds {len(guard.low)} features, there are {base - 1}")
         if self.linear is None and not self.layers:
             raise CorrectorError("it has neither a linear part nor layers")
-        if self.linear is not None and self.linear.shape != (features.STATES, rows):
+        if self.linear is not None and self.linear.shape != (self.layout.size, rows):
             raise CorrectorError(
                 f"linear weights of shape {self.linear.shape} do not fit {method.name}'s features"
             )
-        dense.check(self.layers, base - 1, self.activation)
+        dense.check(self.layers, base - 1, self.layout.size, self.activation)
+
+    @property
+    def _factor_rows(self) -> tuple[int, ...]:
+        return features.factor_rows(self.layout, self.factors)
 
     def data(self, binding: Binding, turbine: Turbine, pitch: float) -> StageMapData:
         from fatigue_runner.integrators.dense import pack
 
         linear = np.zeros(0) if self.linear is None else pack(self.linear * binding.size)[0]
-        factors = np.array(features.factor_rows(self.factors), dtype=np.int64)
+        factors = np.array(self._factor_rows, dtype=np.int64)
         net = dense.packed(self.layers, self.activation, binding.size)
-        return StageMapData(turbine.parameters["g_ratio"], self.history, factors, linear, *net)
+        return StageMapData(turbine.gearbox_ratio, self.history, factors, linear, *net)
 
     def sample(
         self, binding: Binding, turbine: Turbine, winds: Sequence[Any], runs: Sequence[Trajectory], per_wind: int, seed: int
@@ -79,7 +84,7 @@ class StageMap(Map):
     def predict(self, sampled: samples.Samples, size: float) -> Array:
         out = np.zeros(sampled.plain.shape)
         if self.linear is not None:
-            out += sampled.multiplied(self.factors) @ self.linear.T
+            out += sampled.multiplied(self._factor_rows) @ self.linear.T
         if self.layers:
             out += dense.apply(self.layers, sampled.rows[:, 1:], self.activation)
         return out * size
@@ -94,10 +99,10 @@ class StageMap(Map):
         }  # fmt: skip
 
     @classmethod
-    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array]) -> Self:
+    def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array], layout: Layout) -> Self:
         return cls(
             tensors.get("linear"), dense.read(header["layers"], tensors), header["activation"], tuple(header["factors"]),
-            header.get("history", 0),
+            header.get("history", 0), layout,
         )  # fmt: skip
 
     @property
