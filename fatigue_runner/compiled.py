@@ -16,6 +16,7 @@ from typing import Any
 
 import numba
 from numba.core import config as numba_config
+from numba.core.caching import IndexDataCacheFile
 
 # `nnan` lets LLVM assume that there is no NaN: no divergence check may stand in a function compiled with it.
 # Without `reassoc`: with it LLVM sorts sums anew each time that it optimises a function, so that a kernel gives other bits when
@@ -63,6 +64,18 @@ def _prune(base: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+class _Index(IndexDataCacheFile):
+    """What is in the cache. One that names a module which is no longer there is empty: a family of somebody's own, say, in a
+    file outside of the package, would else keep every other from being loaded."""
+
+    def _load_index(self) -> Any:
+        load: Any = super()._load_index
+        try:
+            return load()
+        except (ImportError, AttributeError):
+            return {}
+
+
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """`numba.njit(cache=True, **options)` with the keyed cache; without a writable one it warns and compiles every time.
 
@@ -75,7 +88,11 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
         before = config.CACHE_DIR
         config.CACHE_DIR = str(cache_folder())
         try:
-            return numba.njit(cache=True, **options)(function)
+            made: Any = numba.njit(cache=True, **options)(function)
+            index = getattr(getattr(made, "_cache", None), "_cache_file", None)
+            if index is not None:  # numba may be told not to compile at all
+                index.__class__ = _Index
+            return made
         except (RuntimeError, OSError):
             _warn_once()
             return numba.njit(**options)(function)

@@ -56,3 +56,35 @@ def test_an_unwritable_cache_folder_only_costs_a_warning(tmp_path):
         },
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_a_cache_that_names_a_module_which_is_gone_is_made_anew(tmp_path):
+    """Types of arguments stand in the cache's index: a NamedTuple of a file that somebody has removed."""
+    (tmp_path / "main.py").write_text(
+        "import sys\n"
+        "from fatigue_runner.compiled import njit\n"
+        "@njit()\n"
+        "def first(values):\n"
+        "    return values[0]\n"
+        "if sys.argv[1:] == ['own']:\n"
+        "    from own import Pair\n"
+        "    assert first(Pair(1.0, 2.0)) == 1.0\n"
+        "assert first((3, 4)) == 3\n"
+    )
+    (tmp_path / "own.py").write_text(
+        "from typing import NamedTuple\nclass Pair(NamedTuple):\n    a: float\n    b: float\n"
+    )
+    environment = {
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PATH": "/usr/bin:/bin",
+        "PYTHONPATH": ":".join(p for p in sys.path if p),
+    }
+    for argument in ("own", "none", "none"):
+        done = subprocess.run(
+            [sys.executable, str(tmp_path / "main.py"), argument],
+            capture_output=True,
+            text=True,
+            env=environment,
+        )
+        assert done.returncode == 0, done.stderr
+        (tmp_path / "own.py").unlink(missing_ok=True)
