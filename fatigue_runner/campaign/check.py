@@ -61,9 +61,10 @@ def _unseen_winds(resolved: Resolved) -> list[str]:
     notes = {}
     speeds = sorted({wind.source.mean_speed for wind in resolved.winds})
     for integration in resolved.integrations:
-        if not integration.corrector:
+        corrector = integration.build().corrector
+        if corrector is None:
             continue
-        low, high = integration.build().corrector.wind_range
+        low, high = corrector.wind_range
         outside = [speed for speed in speeds if not low <= speed <= high]
         if outside:
             notes[integration.corrector] = (

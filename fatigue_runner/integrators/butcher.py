@@ -95,7 +95,7 @@ class ButcherTableau:
     def prepare(self, task: Task) -> Prepared:
         """See `contract.Method`."""
         if task.corrector is not None:
-            return corrected.prepare(self, task)
+            return corrected.prepare(self, task, task.corrector)
         arrays = runge_kutta_arrays(self)
         return Prepared(lambda _start, _aligned: arrays, slope_rows(self), self.evaluations)
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from fatigue_runner.integrators.protocol import StepCorrector
     from fatigue_runner.layout import Layout
     from fatigue_runner.turbine import Turbine
 
@@ -30,7 +31,7 @@ class Task:
     layout: Layout
     step: float
     pitch: float
-    corrector: Any = None
+    corrector: StepCorrector | None = None
     mode: str = ""
 
 

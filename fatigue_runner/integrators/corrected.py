@@ -18,6 +18,7 @@ from fatigue_runner.integrators.contract import Aligned, Prepared, Task
 from fatigue_runner.integrators.correction import correction
 from fatigue_runner.integrators.dense import blocks_of
 from fatigue_runner.integrators.guard import GuardUnits, guard, guard_units, norm_of, refuse_outside
+from fatigue_runner.integrators.protocol import StepCorrector
 from fatigue_runner.integrators.runge_kutta import (
     Stages,
     Sum,
@@ -113,9 +114,9 @@ class CorrectedArrays(NamedTuple):
     room: Room
 
 
-def prepare(method: Correctable, task: Task) -> Prepared:
-    """A Runge-Kutta method with the task's corrector. Raises CorrectorError where that does not fit."""
-    corrector, stages = task.corrector, method.evaluations_per_step
+def prepare(method: Correctable, task: Task, corrector: StepCorrector) -> Prepared:
+    """A Runge-Kutta method with a corrector. Raises CorrectorError where that does not fit."""
+    stages = method.evaluations_per_step
     corrector.bind(task.turbine, method.name, task.step)
     judge, own = corrector.guard, runge_kutta_arrays(method)
     if judge.substeps == 0:

@@ -18,6 +18,7 @@ from fatigue_runner.integrators.pitch import PitchSeries
 from fatigue_runner.naming import integrator_id, integrator_label
 
 if TYPE_CHECKING:
+    from fatigue_runner.integrators.protocol import StepCorrector
     from fatigue_runner.trajectory import Trajectory
     from fatigue_runner.turbine import Turbine
     from fatigue_runner.wind import WindSource
@@ -37,7 +38,7 @@ class Integrator:
 
     method: str
     step: float
-    corrector: Any = None  # what is needed of it: `protocol.StepCorrector`
+    corrector: StepCorrector | None = None
     mode: str = ENHANCED
 
     def __post_init__(self) -> None:

@@ -6,7 +6,7 @@ from the others by its type.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ class StageMapData(NamedTuple):
     """A map of what a Runge-Kutta step has computed anyway: the rows of `correction.features`.
 
     ratio: of the gearbox; history: earlier steps whose first slopes follow the stages. The linear part sees all rows, and all rows
-    times each row of `factors`; the net sees the rows alone. linear, net: weights as `correction.pack` orders them, one layer after
+    times each row of `factors`; the net sees the rows alone. linear, net: weights as `dense.pack` orders them, one layer after
     the other, scaled to the defect; sizes: outputs of the layers behind a 0. Empty where there is no such part.
     """
 
@@ -44,9 +44,9 @@ class RawNetworkData(NamedTuple):
 
 
 class MultiBladeData(NamedTuple):
-    """Predictor and corrector of an exponential Adams method on the rows of `exponential_adams`, in multi-blade coordinates.
+    """Predictor and corrector of an exponential Adams method on the rows of `multi_blade`, in multi-blade coordinates.
 
-    ahead, weights: with their learned parts; plain_ahead, plain_weights: without, the fallback; packed by `correction.pack`.
+    ahead, weights: with their learned parts; plain_ahead, plain_weights: without, the fallback; packed by `dense.pack`.
     factors: rows that multiply all rows of the corrector.
     """
 
@@ -89,6 +89,16 @@ class StepCorrector(Protocol):
     @property
     def name(self) -> str: ...
     @property
+    def family(self) -> str:
+        """What kind of learning it is, for tables."""
+        ...
+
+    @property
+    def wind_range(self) -> tuple[float, float]:
+        """Slowest and fastest wind [m/s] that it was trained on: beyond, a run is told so."""
+        ...
+
+    @property
     def method(self) -> str: ...
     @property
     def step(self) -> float:
@@ -117,6 +127,6 @@ class StepCorrector(Protocol):
         """Raises InputError unless it was made for this turbine, method and step [s]."""
         ...
 
-    def map_data(self, turbine: Turbine, pitch: float = 0.0) -> NamedTuple:
+    def map_data(self, turbine: Turbine, pitch: float = 0.0) -> Any:
         """What the compiled loop reads: `StageMapData`, `RawNetworkData`, `MultiBladeData` or another type with code of its own."""
         ...
