@@ -17,6 +17,7 @@ from fatigue_runner._version import __version__
 if TYPE_CHECKING:
     from fatigue_runner.api import (
         ConstantWind,
+        FullFieldWind,
         PitchSeries,
         SeriesWind,
         StepWind,
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ConstantWind",
+    "FullFieldWind",
     "PitchSeries",
     "SeriesWind",
     "StepWind",

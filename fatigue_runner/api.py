@@ -13,13 +13,14 @@ from fatigue_runner.fatigue import damage_equivalent_load, rainflow
 from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
 from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
 from fatigue_runner.turbine import load_turbine
-from fatigue_runner.wind import ConstantWind, SeriesWind, StepWind, TurbulentWind, WindSource
+from fatigue_runner.wind import ConstantWind, FullFieldWind, SeriesWind, StepWind, TurbulentWind, WindSource
 
 if TYPE_CHECKING:
     from fatigue_runner.trajectory import Trajectory
 
 __all__ = [
     "ConstantWind",
+    "FullFieldWind",
     "PitchSeries",
     "SeriesWind",
     "StepWind",

@@ -209,6 +209,26 @@ WIND = (
     Channel("horizontal_shear", "-", "linear horizontal shear", "-"),
 )
 
+TRIPLE = 3  # azimuthal harmonics that the kernels fold at once
+
+
+def harmonic_channels(harmonics: int) -> tuple[Channel, ...]:
+    """The signals behind the three of a wind with `harmonics` azimuthal ones: c_1, s_1, c_2, ... [m/s]; none for 0 or 1, whose shears
+    stand among the three."""
+    orders = range(1, harmonics + 1) if harmonics > 1 else ()
+    return tuple(
+        Channel(f"wind_{part}_{m}", "m/s", f"azimuthal harmonic {m} of the wind, {word}", "m/s")
+        for m in orders
+        for part, word in (("cos", "cosine"), ("sin", "sine"))
+    )
+
+
+def kernel_rows(signals: int) -> int:
+    """Rows of the wind that a kernel takes for that many signals: the harmonics filled up to whole triples."""
+    pairs = (signals - len(WIND)) // 2
+    return len(WIND) + 2 * TRIPLE * -(-pairs // TRIPLE)
+
+
 PITCH = Channel("pitch", "rad", "blade pitch", "deg", DEGREES)
 
 # CADynTurb's T2B1i1cG: two tower modes, one flap mode of each blade, a collective edge mode, rotor and generator

@@ -18,6 +18,7 @@ from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.table_builder import (
     PITCH_DEG,
     TIP_SPEED_RATIO,
+    best_weight,
     build_tables,
     has_skewed_wake,
     load_coefficients,
@@ -38,6 +39,7 @@ def problems(name: str) -> list[str]:
     blade, inputs = turbine_blade(parameters)
     with np.load(path, allow_pickle=False) as data:
         found, coefficients = str(data["inputs"]), data["coefficients"]
+        weight = data["span_weight"] if "span_weight" in data else np.zeros((2, 1))
     if found != inputs:
         return [f"{path.name} was made from other inputs"]
     random = np.random.default_rng(0)
@@ -49,6 +51,9 @@ def problems(name: str) -> list[str]:
     if not np.allclose(again, coefficients[:, i, j], rtol=1e-7, atol=1e-9):
         worst = np.abs(again - coefficients[:, i, j]).max()
         return [f"{path.name} differs from what its inputs give now, by up to {worst:.2g}"]
+    expected = best_weight(blade, coefficients)
+    if weight.shape != expected.shape or not np.allclose(weight, expected, rtol=1e-6, atol=1e-9):
+        return [f"{path.name} holds another span weight than its inputs give now"]
     return []
 
 
@@ -69,7 +74,8 @@ def main() -> int:
         parameters = read_turbine_file(name)
         blade, inputs = turbine_blade(parameters)
         path = Path(parameters["aerodynamics"]["tables"])
-        write_tables(path, build_tables(blade, has_skewed_wake(parameters)), inputs)
+        coefficients = build_tables(blade, has_skewed_wake(parameters))
+        write_tables(path, coefficients, inputs, best_weight(blade, coefficients))
         print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")
     return 0
 

@@ -57,7 +57,8 @@ def run_block(job: Job) -> list[dict[str, Any]]:
 
     No exception of one integrator or case ends the others: it becomes a row with the status `failed`.
     """
-    winds = {case.wind: _wind(case) for case in [*job.references, *job.cases]}
+    rotor = _turbine(job.setup.turbine, job.setup.turbine_hash).rotor
+    winds = {case.wind: _wind(case, rotor) for case in [*job.references, *job.cases]}
     references: dict[Any, Evaluated | None] = {}
     wanted = {case.id for case in job.cases}
     records = []
@@ -88,9 +89,9 @@ def _by_integration(cases: Iterable[Case]) -> dict[Integration, list[Case]]:
     return {integration: list(group.values()) for integration, group in groups.items()}
 
 
-def _wind(case: Case) -> Any:
+def _wind(case: Case, rotor: Any) -> Any:
     try:
-        return case.wind.build()
+        return case.wind.build(rotor)
     except FatigueRunnerError as error:
         return error
 

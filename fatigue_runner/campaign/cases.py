@@ -67,12 +67,12 @@ def _refuse_same_names(cases: Iterable[Case]) -> None:
         seen[case.id] = case
 
 
-def blocks(items: Sequence[Any], keys: Sequence[float | None], size: int, workers: int) -> list[list[Any]]:
-    """Winds grouped for the lane kernel: one cell grid (`keys`) per block, at most `size` winds, even shares.
+def blocks(items: Sequence[Any], keys: Sequence[Any], size: int, workers: int) -> list[list[Any]]:
+    """Winds grouped for the lane kernel: one grid and number of signals (`keys`) per block, at most `size` winds, even shares.
 
     No more blocks than needed, but at least `workers` where there are winds enough.
     """
-    groups: dict[float | None, list[Any]] = {}
+    groups: dict[Any, list[Any]] = {}
     for item, key in zip(items, keys, strict=True):
         groups.setdefault(key, []).append(item)
     result = []

@@ -15,6 +15,7 @@ from fatigue_runner.campaign.spec import Campaign, IntegratorSection
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.source import Place, Source
 from fatigue_runner.inputs.sweep import expand
+from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.section import Realisation, Site
 from fatigue_runner.wind.source import WindSource
 
@@ -149,7 +150,7 @@ def _winds(
     winds, starts = [], _Starts(campaign, turbine, pitch)
     for named in campaign.wind.realisations(Site(turbine.rotor, campaign.duration, place)):
         where = place.where(*named.path)
-        blowing = _blowing(named, campaign.duration, where)
+        blowing = _blowing(named, turbine.rotor, campaign.duration, where)
         try:
             winds.append(ResolvedWind(named, blowing, starts.of(blowing)))
         except InputError as error:
@@ -157,12 +158,12 @@ def _winds(
     return winds
 
 
-def _blowing(named: Realisation, duration: float, where: str) -> WindSource:
+def _blowing(named: Realisation, rotor: Rotor, duration: float, where: str) -> WindSource:
     """The wind source; refused outside the tables or where it is too short."""
     if named.mean_speed is not None:
         _check_speed(named.mean_speed, where)
     try:
-        wind = named.build()
+        wind = named.build(rotor)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
     _check_speed(wind.mean_speed, where)

@@ -188,7 +188,8 @@ Speeds = Annotated[
 class Winds(Section):
     """`type: constant` with `speeds`, `vertical_shear`, `horizontal_shear` (lists, every combination), or `type: turbulent` with
     `speeds: {start, stop, count}`, `intensity: [low, high]`, `shear_exponent: [low, high]`, `seed`: one wind per speed, the two drawn,
-    over a rotor of 63 m with its hub at 90 m whatever the turbine, so that a shipped recipe gives the shipped corrector; `duration` [s]."""
+    over a rotor of 63 m with its hub at 90 m whatever the turbine, so that a shipped recipe gives the shipped corrector; `harmonics`:
+    azimuthal ones of turbulence (default 1: mean and linear shears); `duration` [s]."""
 
     type: Literal["constant", "turbulent"] = "turbulent"
     speeds: Speeds
@@ -197,6 +198,7 @@ class Winds(Section):
     vertical_shear: list[float] = Field(default=[0.0])
     horizontal_shear: list[float] = Field(default=[0.0])
     seed: int = Field(default=0, ge=0)
+    harmonics: int = Field(default=1, ge=0, le=16)
     duration: float = Field(default=120.0, ge=2, le=1e4)
 
     @property
@@ -219,7 +221,7 @@ class Winds(Section):
             TurbulentWind(
                 v, intensity=float(rng.uniform(*self.intensity)), shear_exponent=float(rng.uniform(*self.shear_exponent)),
                 seed=100_000 + 1000 * self.seed + number, duration=self.duration,
-                rotor_radius=63.0, hub_height=90.0,
+                rotor_radius=63.0, hub_height=90.0, harmonics=self.harmonics,
             )
             for number, v in enumerate(self.speed_list)
         ]  # fmt: skip

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
         Ensemble,
         Integrator,
         simulate,
-        simulate_block,
         warm_up,
     )
     from fatigue_runner.integrators.methods import METHODS, method
@@ -32,7 +31,6 @@ __all__ = [
     "Integrator",
     "method",
     "simulate",
-    "simulate_block",
     "stability_limit",
     "warm_up",
 ]

@@ -73,10 +73,12 @@ def _output_rows(count: int, width: int) -> Array:
 
 def make_block(
     turbine: Turbine, method: Method, step: float, duration: float, output_step: float | None,
-    pitch: float | PitchSeries, corrector: Any, mode: str,
+    pitch: float | PitchSeries, corrector: Any, mode: str, harmonics: bool,
 ) -> Block:  # fmt: skip
-    """The method made ready. The last step ends at or after `duration` [s]. Raises InputError for impossible numbers, and where
-    method, corrector and pitch do not go together."""
+    """The method made ready; harmonics: whether the winds have azimuthal ones. The last step ends at or after `duration` [s].
+
+    Raises InputError for impossible numbers, and where method, corrector and pitch do not go together.
+    """
     for name, value in (("duration", duration), ("output step", output_step)):
         if value is not None and not (value > 0 and np.isfinite(value)):
             raise InputError(f"{name} must be a positive number of seconds, got {value}")
@@ -93,8 +95,9 @@ def make_block(
         )
     steps = int(np.ceil(duration / step - 1e-9))
     plan = plan_output(duration, step, steps, output_step, method.order)
-    data = turbine.pitched_kernel_data() if varying else turbine.kernel_data(first_pitch(pitch))
-    task = Task(turbine, data.model.layout, step, first_pitch(pitch), corrector, mode)
+    start = first_pitch(pitch)
+    data = turbine.pitched_kernel_data(harmonics) if varying else turbine.kernel_data(start, harmonics)
+    task = Task(turbine, data.model.layout, step, start, corrector, mode)
     return Block(turbine, method, step, steps, plan, pitch, data, method.prepare(task))
 
 
@@ -114,7 +117,7 @@ def run_block(block: Block, winds: Sequence[WindSource], initial: Array) -> list
     out: list[Trajectory] = []
     for number, (x, own) in enumerate(zip(groups, blocks, strict=True)):
         changing = control is not None or bool(np.any(own[:, 1:])) or len(own) > 1
-        p, u = (np.zeros(len(signals) * LANES) for signals in (layout.wind, layout.control))
+        p, u = np.zeros(own.shape[2]), np.zeros(len(layout.control) * LANES)
         signals = Signals(cell_duration, aligned(own), changing, control, aligned(p), aligned(u))
         group = _run_group(block, x, signals)
         lanes = min(LANES, len(winds) - number * LANES)
@@ -144,7 +147,7 @@ def _run_group(block: Block, x: Array, signals: Signals) -> _Group:
         errors=np.full((intervals, LANES), np.nan),
         diverged_at=np.where(fine, -1.0, 0.0),
     )
-    method = block.prepared.arrays(start, aligned)
+    method = block.prepared.arrays(start, signals, aligned)
     arguments = (
         method, data.model, block.step, block.steps, signals, data.arrays(clamped)._replace(tables=tables),
         room(start, block.prepared.slopes, 1 << (size - 1).bit_length(), aligned), plan.arrays, out,

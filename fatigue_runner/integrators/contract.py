@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from fatigue_runner.integrators.protocol import StepCorrector
+    from fatigue_runner.integrators.signals import Signals
     from fatigue_runner.layout import Layout
     from fatigue_runner.turbine import Turbine
 
@@ -39,12 +40,12 @@ class Task:
 class Prepared:
     """A method made ready for the runs of one block.
 
-    arrays: from the initial states (width,) of a group, and a function that copies onto cache lines, to the NamedTuple that the
-    compiled step takes, with room of its own; slopes: rows of k; evaluations: of f in a run of so many steps; limit: of the
+    arrays: from the initial states (width,) of a group, its signals and a function that copies onto cache lines, to the NamedTuple
+    that the compiled step takes, with room of its own; slopes: rows of k; evaluations: of f in a run of so many steps; limit: of the
     hybrid's discrepancy, NaN where no step is tested.
     """
 
-    arrays: Callable[[Array, Aligned], Any]
+    arrays: Callable[[Array, Signals, Aligned], Any]
     slopes: int
     evaluations: Callable[[int], int]
     limit: float = np.nan

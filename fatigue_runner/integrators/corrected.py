@@ -131,8 +131,8 @@ def prepare(method: Correctable, task: Task, corrector: StepCorrector) -> Prepar
     tested = Tested(hybrid, units, limit, norm_of(judge), *bounds)
     learned = corrector.map_data(task.turbine, task.pitch)
 
-    def arrays(start: Array, aligned: Aligned) -> CorrectedArrays:
-        room = _room(start, task, slope_rows(method), aligned)
+    def arrays(start: Array, signals: Signals, aligned: Aligned) -> CorrectedArrays:
+        room = _room(start, len(signals.p), task, slope_rows(method), aligned)
         return CorrectedArrays(
             own.stages, own.result, stage_rows(stages), learned, corrector.history, fallback, tested, room
         )
@@ -156,9 +156,9 @@ def _sharing(method: Correctable, name: str) -> tuple[Fallback, int]:
     return Fallback(stages_of(other), result_of(other), stages, 0), other.evaluations_per_step - stages
 
 
-def _room(start: Array, task: Task, slopes: int, aligned: Aligned) -> Room:
+def _room(start: Array, blown: int, task: Task, slopes: int, aligned: Aligned) -> Room:
     layout, width_ = task.layout, len(start)
-    padded, blown = 8 * blocks_of(layout.size) * LANES, len(layout.wind) * LANES
+    padded = 8 * blocks_of(layout.size) * LANES
     zeros = {
         "plain": width_, "fixed": width_, "other": width_, "defect": padded, "start": blown, "middle": blown,
         "seen": MOST_ROWS * LANES, "scaled": (1 << (layout.size - 1).bit_length()) * LANES,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.integrators.block import make_block, run_block
+from fatigue_runner.integrators.block import Block, make_block, run_block
 from fatigue_runner.integrators.contract import Method
 from fatigue_runner.integrators.methods import METHODS
 from fatigue_runner.integrators.methods import method as find_method
@@ -102,10 +102,10 @@ class Ensemble:
         return replace(self, winds=[self.winds[i] for i in chosen], initial=self.initial[list(chosen)])
 
     def groups(self) -> list[list[int]]:
-        """Numbers of the cases that may advance together: those whose winds share a time grid."""
-        by_key: dict[float | None, list[int]] = {}
+        """Numbers of the cases that may advance together: those whose winds share a time grid and have as many signals."""
+        by_key: dict[Any, list[int]] = {}
         for i, wind in enumerate(self.winds):
-            by_key.setdefault(wind.cell_key, []).append(i)
+            by_key.setdefault((wind.cell_key, wind.triples), []).append(i)
         return list(by_key.values())
 
 
@@ -119,12 +119,16 @@ def simulate(ensemble: Ensemble, integrator: Integrator) -> list[Trajectory]:
     initial = np.asarray(e.initial, float)
     if initial.shape != shape:
         raise InputError(f"initial must have shape {shape}, one state per wind, got {initial.shape}")
-    block = make_block(
-        e.turbine, found, integrator.step, e.duration, e.output_step, e.pitch, integrator.corrector, integrator.mode
-    )  # fmt: skip
+    blocks: dict[bool, Block] = {}
     out: list[Any] = [None] * len(e)
     for chosen in e.groups():
-        runs = run_block(block, [e.winds[i] for i in chosen], initial[chosen])
+        winds = [e.winds[i] for i in chosen]
+        harmonics = winds[0].triples > 0
+        if harmonics not in blocks:
+            blocks[harmonics] = make_block(
+                e.turbine, found, integrator.step, e.duration, e.output_step, e.pitch, integrator.corrector, integrator.mode, harmonics
+            )  # fmt: skip
+        runs = run_block(blocks[harmonics], winds, initial[chosen])
         for i, trajectory in zip(chosen, runs, strict=True):
             out[i] = trajectory
     return out
@@ -138,12 +142,3 @@ def warm_up(method: str = "heun") -> None:
     turbine = load_turbine("nrel5mw")
     initial = np.zeros((1, turbine.layout.size)) + 1e-3
     simulate(Ensemble(turbine, [ConstantWind(8.0)], initial, 0.02), Integrator(method, 0.01))
-
-
-def simulate_block(
-    turbine: Turbine, method: str, step: float, winds: Sequence[WindSource], initial: Array, duration: float,
-    output_step: float | None = None, pitch: float | PitchSeries = 0.0, corrector: Any = None, mode: str = ENHANCED,
-) -> list[Trajectory]:  # fmt: skip
-    """`simulate` with everything in one call; for callers that do not have the nouns yet."""
-    cases = Ensemble(turbine, winds, initial, duration, output_step, pitch)
-    return simulate(cases, Integrator(method, step, corrector, mode))

@@ -110,8 +110,8 @@ class ExponentialAdams:
             own, before = guard_units(judge.atol, judge.rtol), guard_units(judge.ahead_atol, judge.rtol)
             tested = Tested(task.mode == "hybrid", before, own, limit, norm_of(judge))
 
-        def arrays(states: Array, aligned: Aligned) -> ExponentialAdamsArrays:
-            room = _room(states, task.layout, past, len(maps.factors), aligned)
+        def arrays(states: Array, signals: Signals, aligned: Aligned) -> ExponentialAdamsArrays:
+            room = _room(states, len(signals.p), task.layout, past, len(maps.factors), aligned)
             return ExponentialAdamsArrays(
                 low, ratio, past, start.stages, start.result, STARTING, maps, tested, room
             )
@@ -184,17 +184,17 @@ def _plain_maps(ahead: Array, plain: Array) -> MultiBladeData:
     return MultiBladeData(first, first, second, second, np.zeros(0, np.int64))
 
 
-def _room(start: Array, layout: Any, past: int, factors: int, aligned: Aligned) -> Room:
+def _room(start: Array, blown: int, layout: Any, past: int, factors: int, aligned: Aligned) -> Room:
     width, padded = len(start), 8 * blocks_of(layout.size) * LANES
     part = multi_blade.parts(layout)
     inputs = multi_blade.base_rows(layout, past) * (1 + factors)
     halves = 1 << (layout.size - 1).bit_length()
     zeros = {
         "ahead": padded, "fixed": padded, "other": padded, "change": padded,
-        "start": len(layout.wind) * LANES, "middle": len(layout.wind) * LANES,
+        "start": blown, "middle": blown,
         "seen": inputs * LANES, "turned": 2 * LANES, "rel": layout.relative_size * LANES,
         "product": 8 * blocks_of(part) * LANES, "scaled": halves * LANES, "stage": width,
-        "wind": len(layout.wind) * LANES,
+        "wind": blown,
     }  # fmt: skip
     return Room(
         **{name: aligned(np.zeros(size)) for name, size in zeros.items()},

@@ -20,7 +20,7 @@ from fatigue_runner.integrators.choice import compiled_for
 from fatigue_runner.integrators.contract import Aligned, Prepared, Task
 from fatigue_runner.integrators.dense import blocks_of, dense_rows, pack
 from fatigue_runner.integrators.linear_part import linear_part, phi_functions
-from fatigue_runner.integrators.signals import signals_at
+from fatigue_runner.integrators.signals import Signals, signals_at
 from fatigue_runner.integrators.stepper import RING, advance, begin, finish, note, recover
 from fatigue_runner.integrators.stepping import add, all_fine, keep
 from fatigue_runner.turbine.model import rhs, rows, width
@@ -56,7 +56,7 @@ class ExponentialRungeKutta:
         """See `contract.Method`."""
         parts, padded = matrices(task.turbine, task.step, task.pitch), blocks_of(task.layout.size) * 8
 
-        def arrays(start: Array, aligned: Aligned) -> ExponentialArrays:
+        def arrays(start: Array, signals: Signals, aligned: Aligned) -> ExponentialArrays:
             lanes = len(start) // task.layout.size
             return ExponentialArrays(*parts, *(aligned(np.zeros(padded * lanes)) for _ in range(9)))
 

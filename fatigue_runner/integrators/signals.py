@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.integrators.choice import compiled_for
 from fatigue_runner.turbine.lane_code import LANES
-from fatigue_runner.turbine.model import wind_signals
+from fatigue_runner.turbine.model import harmonics, wind_signals
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,9 @@ def _wind_cells(model, time, cell_duration, cells, p):
     # 0.3 / 0.1 is 2.9999999999999996: a step time belongs to the cell that begins there
     i = min(max(int(time / cell_duration + 1e-9), 0), cells.shape[0] - 1)
     u = time - i * cell_duration
-    for m in range(wind_signals(model) * LANES):
+    # a constant where the model's wind has no harmonics, as many as the wind has otherwise
+    count = len(p) if harmonics(model) else wind_signals(model) * LANES
+    for m in range(count):
         p[m] = ((cells[i, 3, m] * u + cells[i, 2, m]) * u + cells[i, 1, m]) * u + cells[i, 0, m]
 
 

@@ -32,6 +32,10 @@ Polar = Callable[[Array], Array]
 
 LOAD_NAMES = ("thrust", "tangential", "torque", "bending", "flap", "edge")
 
+# Half widths of the central differences, by the wind speed; those in the rotor plane grow with the tip-speed
+# ratio, so that they turn the flow as much as the others and yet never turn it round near the hub.
+STEPS = {"kappa": 0.05, "y": 0.02, "flap": 0.05, "edge": 0.05, "skew": 0.05}
+
 
 @dataclass(frozen=True)
 class BladeAerodynamics:

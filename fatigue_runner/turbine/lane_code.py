@@ -34,7 +34,9 @@ _OPERATORS = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv
 class Code:
     """text: the assignments. The name `place` is looked up in cubic cells and gives `tables`, the names of columns 0, 1, ...
 
-    With `second`, the name of another place that is assigned before, the cells are bicubic.
+    With `second`, the name of another place that is assigned before, the cells are bicubic. The statement `mean, cos, sin =
+    harmonics(array, row, cosine, sine)` folds azimuthal harmonics c_1, s_1, c_2, ... in the array's rows from `row` on, a multiple of
+    three pairs, into their sum at three blades 120 degrees apart: mean + cos cos(alpha) + sin sin(alpha).
     """
 
     text: str
@@ -58,13 +60,17 @@ def lane_kernel(code: Code, arrays: Sequence[str], lanes: int) -> Callable[..., 
         signature = types.void(*[flat] * count, types.int64, flat, types.int64, flat, counters)
 
         def codegen(context, builder, sig, args):
-            data = [
-                context.make_array(sig.args[i])(context, builder, args[i]).data
+            found = [
+                context.make_array(sig.args[i])(context, builder, args[i])
                 if i not in (count, count + 2)
                 else args[i]
                 for i in range(count + 5)
             ]
+            data = [value if i in (count, count + 2) else value.data for i, value in enumerate(found)]
             names = [*arrays, "start", "tables", "cells", "constants", "clamped"]
+            if "harmonics(" in code.text:
+                data.append(found[arrays.index("wind")].nitems)
+                names.append("wind_size")
             # a function of its own that takes nothing but pointers: numba's pass seven words an array
             kind = ir.FunctionType(ir.VoidType(), [value.type for value in data])
             function = ir.Function(builder.module, kind, builder.module.get_unique_name("lane_kernel"))
@@ -111,7 +117,11 @@ class _Emitter:
             self.lane = self.builder.mul(loop.index, _WORD(self.size))
             for statement in statements:
                 assert isinstance(statement, ast.Assign)
-                self.assign(statement.targets[0], self.expression(statement.value))
+                target = statement.targets[0]
+                if isinstance(target, ast.Tuple):
+                    self.fold(target, statement.value)
+                else:
+                    self.assign(target, self.expression(statement.value))
 
     def assign(self, target: ast.expr, value: Any) -> None:
         if isinstance(target, ast.Name):
@@ -145,6 +155,56 @@ class _Emitter:
             place = b.gep(self.data["constants"], [_WORD(int(_number(node.slice)))])
             return self.splat(b.load(place), self.size)
         return self.load(self.address(node), self.vector)
+
+    # --- azimuthal harmonics ---
+
+    def fold(self, target: ast.Tuple, call: ast.expr) -> None:
+        """`mean, cos, sin = harmonics(array, row, cosine, sine)`: see `Code`.
+
+        At the azimuth psi + alpha, c_m cos m(psi + alpha) + s_m sin m(psi + alpha) = a cos(m alpha) + b sin(m alpha) with
+        a = c_m cos(m psi) + s_m sin(m psi), b = s_m cos(m psi) - c_m sin(m psi). At three blades cos(m alpha) is 1, cos(alpha),
+        cos(alpha) and sin(m alpha) is 0, sin(alpha), -sin(alpha) for m = 3k, 3k + 1, 3k + 2.
+        """
+        assert isinstance(call, ast.Call) and all(isinstance(name, ast.Name) for name in target.elts)
+        b, array = self.builder, call.args[0]
+        assert isinstance(array, ast.Name)
+        first = int(_number(call.args[1]))
+        cosine, sine = (self.expression(a) for a in call.args[2:])
+        slots = {name: cgutils.alloca_once(b, self.vector) for name in ("c", "s", "mean", "cos", "sin")}
+        for name in ("mean", "cos", "sin"):
+            b.store(self.number(0.0), slots[name])
+        b.store(self.number(1.0), slots["c"])
+        b.store(self.number(0.0), slots["s"])
+        rows = b.sub(self.data[f"{array.id}_size"], _WORD(first * self.lanes))
+        with cgutils.for_range(b, b.udiv(rows, _WORD(6 * self.lanes))) as loop:
+            place = b.add(self.lane, b.mul(loop.index, _WORD(6 * self.lanes)))
+            for m in (1, 2, 3):
+                c, s = b.load(slots["c"]), b.load(slots["s"])
+                turned = self.sum_of((c, cosine), (s, sine), minus=True), self.sum_of((s, cosine), (c, sine))
+                b.store(turned[0], slots["c"])
+                b.store(turned[1], slots["s"])
+                pair = [
+                    self.load(b.gep(self.data[array.id], [b.add(place, _WORD((first + 2 * m - 2 + i) * self.lanes))]), self.vector)
+                    for i in (0, 1)
+                ]  # fmt: skip
+                along = self.sum_of((pair[0], turned[0]), (pair[1], turned[1]))
+                self.add_to(slots["mean" if m == 3 else "cos"], along)
+                if m < 3:
+                    across = self.sum_of((pair[1], turned[0]), (pair[0], turned[1]), minus=True)
+                    self.add_to(slots["sin"], across, minus=m == 2)
+        for element, slot in zip(target.elts, ("mean", "cos", "sin"), strict=True):
+            assert isinstance(element, ast.Name)
+            self.values[element.id] = b.load(slots[slot])
+
+    def sum_of(self, one: tuple[Any, Any], other: tuple[Any, Any], minus: bool = False) -> Any:
+        """Product + product, or their difference."""
+        b = self.builder
+        first, second = (b.fmul(*pair, flags=_FLAGS) for pair in (one, other))
+        return (b.fsub if minus else b.fadd)(first, second, flags=_FLAGS)
+
+    def add_to(self, slot: Any, value: Any, minus: bool = False) -> None:
+        b = self.builder
+        b.store((b.fsub if minus else b.fadd)(b.load(slot), value, flags=_FLAGS), slot)
 
     # --- values ---
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from fatigue_runner.compiled import INLINE, njit
 from fatigue_runner.layout import PITCH, T2B1I1CG, Layout
-from fatigue_runner.turbine.generated import kernel, pitched
+from fatigue_runner.turbine.generated import harmonic, kernel, pitched, pitched_harmonic
 from fatigue_runner.turbine.lane_code import LANES
 
 Array = NDArray[np.float64]
@@ -112,6 +112,7 @@ freedoms = constant(lambda layout: layout.freedoms)
 rotor = constant(lambda layout: layout.rotor)
 first_order = constant(lambda layout: len(layout.first_order))
 wind_signals = constant(lambda layout: len(layout.wind))
+harmonics = constant(lambda layout: int(layout.harmonics))
 control_signals = constant(lambda layout: len(layout.control))
 
 
@@ -159,3 +160,7 @@ def loads(model, x, wind, control, derivative, out, start, data):
 
 FIXED_PITCH = Model("fixed-pitch", kernel, T2B1I1CG)
 VARYING_PITCH = Model("varying-pitch", pitched, T2B1I1CG.extended(control=(PITCH,)))
+HARMONIC = Model("fixed-pitch-harmonic", harmonic, FIXED_PITCH.layout.extended(harmonics=True))
+VARYING_PITCH_HARMONIC = Model(
+    "varying-pitch-harmonic", pitched_harmonic, VARYING_PITCH.layout.extended(harmonics=True)
+)

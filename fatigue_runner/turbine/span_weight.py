@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.turbine.aerodynamics import BladeAerodynamics, strip_loads
-from fatigue_runner.turbine.table_builder import STEPS
+from fatigue_runner.turbine.aerodynamics import STEPS, BladeAerodynamics, strip_loads
 
 # What the weight can be that of; the project's blade-effective wind has that of the root flap moment.
 LOADS = ("flap_moment", "thrust", "torque")

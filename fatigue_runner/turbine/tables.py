@@ -21,13 +21,15 @@ class AeroTables:
     """Coefficients by name.
 
     tip_speed_ratio (n,) uniform [-]; pitch (k,) [rad], rising; coefficients {name: (n, k)}. `interpolation`: cubic (C2 splines in
-    both directions) or bilinear, whose kinks stall methods of high order but reproduce CADynTurb.
+    both directions) or bilinear, whose kinks stall methods of high order but reproduce CADynTurb. span_weight: `rotor.Rotor.weight`, or
+    None where the tables come from a program that does not tell.
     """
 
     tip_speed_ratio: NDArray[np.float64]
     pitch: NDArray[np.float64]
     coefficients: Mapping[str, NDArray[np.float64]]
     interpolation: str = "cubic"
+    span_weight: tuple[tuple[float, ...], tuple[float, ...]] | None = None
 
     def __post_init__(self) -> None:
         if self.interpolation not in INTERPOLATIONS:
@@ -52,10 +54,7 @@ class AeroTables:
                 f"pitch {np.degrees(pitch):g} deg is outside the aerodynamic table "
                 f"({np.degrees(low):g} to {np.degrees(high):g} deg)"
             )
-        n = len(self.tip_speed_ratio)
-        stack = np.stack(
-            [self.coefficients.get(name, np.zeros((n, len(self.pitch)))) for name in names], axis=-1
-        )
+        stack = np.stack([self._coefficient(name) for name in names], axis=-1)
         if len(self.pitch) == 1:
             return stack[:, 0]
         if self.interpolation == "bilinear":
@@ -65,6 +64,23 @@ class AeroTables:
         from scipy.interpolate import CubicSpline
 
         return CubicSpline(self.pitch, stack, axis=1)(pitch)
+
+    def _coefficient(self, name: str) -> NDArray[np.float64]:
+        """(n, k) of a table, zero without one; `X_w`, by a wind that is the same all along the blade, from the table X.
+
+        A load is rho/6 A V^2 X(lambda), so that at a fixed rotor speed d/dV gives rho/6 A V (2 X - lambda X').
+        """
+        shape = (len(self.tip_speed_ratio), len(self.pitch))
+        if name in self.coefficients or not name.endswith("_w"):
+            return self.coefficients.get(name, np.zeros(shape))
+        values = self.coefficients.get(name.removesuffix("_w"), np.zeros(shape))
+        if self.interpolation == "bilinear":
+            slope = np.gradient(values, self.tip_speed_ratio, axis=0)
+        else:
+            from scipy.interpolate import CubicSpline
+
+            slope = CubicSpline(self.tip_speed_ratio, values)(self.tip_speed_ratio, 1)
+        return np.asarray(2 * values - self.tip_speed_ratio[:, None] * slope)
 
     def cells(self, pitch: float, names: Sequence[str]) -> NDArray[np.float64]:
         """Flat array for the kernels: header, then per cell the coefficients 1, u, u^2, u^3 of all names side by side.
@@ -140,8 +156,16 @@ def read_tables(path: Path, interpolation: str) -> AeroTables:
     with np.load(path, allow_pickle=False) as data:
         names = [str(n) for n in data["names"]]
         coefficients = dict(zip(names, data["coefficients"].astype(float), strict=True))
+        weight = None
+        if "span_weight" in data:
+            radii, density = data["span_weight"].astype(float).tolist()
+            weight = tuple(radii), tuple(density)
         return AeroTables(
-            data["tip_speed_ratio"].astype(float), data["pitch"].astype(float), coefficients, interpolation
+            data["tip_speed_ratio"].astype(float),
+            data["pitch"].astype(float),
+            coefficients,
+            interpolation,
+            weight,
         )
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.layout import T2B1I1CG, Layout
-from fatigue_runner.rotor import Rotor
+from fatigue_runner.layout import T2B1I1CG, Layout, kernel_rows
+from fatigue_runner.rotor import SQUARE, Rotor
 from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turbine_file
 from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
@@ -44,13 +44,13 @@ class Turbine:
         """SHA-256 of parameters, tables and interpolation: what logs, correctors and reports are bound to."""
         return _hash(self)
 
-    def kernel_data(self, pitch: float = 0.0) -> KernelData:
-        """Constants and table cells for the kernels; pitch [rad], positive to feather."""
-        return _kernel_data(self, float(pitch))
+    def kernel_data(self, pitch: float = 0.0, harmonics: bool = False) -> KernelData:
+        """Constants and table cells for the kernels; pitch [rad], positive to feather; harmonics: for winds with azimuthal ones."""
+        return _kernel_data(self, float(pitch), harmonics)
 
-    def pitched_kernel_data(self) -> KernelData:
+    def pitched_kernel_data(self, harmonics: bool = False) -> KernelData:
         """The same for a pitch that varies in time. Raises InputError where the tables have too few pitches."""
-        return _pitched_kernel_data(self)
+        return _pitched_kernel_data(self, harmonics)
 
     @property
     def pitch_range(self) -> tuple[float, float]:
@@ -65,7 +65,10 @@ class Turbine:
     @property
     def rotor(self) -> Rotor:
         """What a wind source needs to know of the turbine."""
-        return Rotor(self.rotor_radius, self.hub_height)
+        p = self.parameters
+        tilt = float(np.arctan2(p["sin_tilt"], p["cos_tilt"]))
+        weight = self.tables.span_weight or SQUARE
+        return Rotor(self.rotor_radius, self.hub_height, weight, p["overhang"] * p["cos_tilt"], tilt)
 
     @property
     def gearbox_ratio(self) -> float:
@@ -107,16 +110,18 @@ class Turbine:
         return evaluate(self.kernel_data(float(angle)), columns, p)[0].reshape(x.shape)
 
     def loads(self, state: ArrayLike, wind: ArrayLike, pitch: ArrayLike = 0.0) -> dict[str, Array]:
-        """Load channels [SI] for states (n, k) and wind signals (n, 3), the accelerations being those of the equations.
+        """Load channels [SI] for states (n, k) and wind signals (n, 3 or more), the accelerations being those of the equations.
 
         pitch [rad]: a number, or (n,), the pitch of each state.
         """
         from fatigue_runner.turbine.lanes import load_channels
 
         angle, x, signals = (np.asarray(values, float) for values in (pitch, state, wind))
+        harmonics = signals.shape[1] > len(self.layout.wind)
+        signals = np.pad(signals, ((0, 0), (0, kernel_rows(signals.shape[1]) - signals.shape[1])))
         if angle.ndim:
-            return load_channels(self.pitched_kernel_data(), x, signals, angle[:, None])
-        return load_channels(self.kernel_data(float(angle)), x, signals)
+            return load_channels(self.pitched_kernel_data(harmonics), x, signals, angle[:, None])
+        return load_channels(self.kernel_data(float(angle), harmonics), x, signals)
 
     def operating_point(
         self,
@@ -157,13 +162,14 @@ def _hash(turbine: Turbine) -> str:
 
 
 @lru_cache(maxsize=256)
-def _kernel_data(turbine: Turbine, pitch: float) -> KernelData:
+def _kernel_data(turbine: Turbine, pitch: float, harmonics: bool) -> KernelData:
     from fatigue_runner.turbine.lanes import KernelData
-    from fatigue_runner.turbine.model import FIXED_PITCH
+    from fatigue_runner.turbine.model import FIXED_PITCH, HARMONIC
 
-    kernel = FIXED_PITCH.generated
+    model = HARMONIC if harmonics else FIXED_PITCH
+    kernel = model.generated
     return KernelData(
-        model=FIXED_PITCH,
+        model=model,
         constants=kernel.constants(at_pitch(turbine.parameters, pitch)),
         tables=turbine.tables.cells(pitch, kernel.TABLES[: kernel.EQUATION_TABLES]),
         load_tables=turbine.tables.cells(pitch, kernel.TABLES),
@@ -172,13 +178,14 @@ def _kernel_data(turbine: Turbine, pitch: float) -> KernelData:
 
 
 @lru_cache(maxsize=4)
-def _pitched_kernel_data(turbine: Turbine) -> KernelData:
+def _pitched_kernel_data(turbine: Turbine, harmonics: bool) -> KernelData:
     from fatigue_runner.turbine.lanes import KernelData
-    from fatigue_runner.turbine.model import VARYING_PITCH
+    from fatigue_runner.turbine.model import VARYING_PITCH, VARYING_PITCH_HARMONIC
 
-    kernel = VARYING_PITCH.generated
+    model = VARYING_PITCH_HARMONIC if harmonics else VARYING_PITCH
+    kernel = model.generated
     return KernelData(
-        model=VARYING_PITCH,
+        model=model,
         constants=kernel.constants(turbine.parameters),
         tables=turbine.tables.pitched_cells(kernel.TABLES[: kernel.EQUATION_TABLES]),
         load_tables=turbine.tables.pitched_cells(kernel.TABLES),

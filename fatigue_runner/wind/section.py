@@ -47,9 +47,9 @@ class Realisation:
     mean_speed: float | None = None
     contents: tuple[tuple[str, str], ...] = ()
 
-    def build(self) -> WindSource:
-        """The wind source; raises InputError for parameters that it refuses."""
-        return make_wind(self.kind, **dict(self.parameters))
+    def build(self, rotor: Rotor) -> WindSource:
+        """The wind source as it blows on this rotor; raises InputError for parameters that it refuses."""
+        return make_wind(self.kind, **dict(self.parameters)).on(rotor)
 
     @property
     def identity(self) -> list[Any]:

@@ -33,8 +33,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from fatigue_runner.channels import WIND_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.layout import TRIPLE, WIND, harmonic_channels, kernel_rows
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.cells import ROUNDING, cell_count, evaluate, minimum
 from fatigue_runner.wind.checks import number
@@ -44,9 +44,10 @@ SOURCES: dict[str, Callable[..., WindSource]] = {}
 
 
 class WindSource(ABC):
-    """Wind of one case in time: speed v [m/s], vertical and horizontal shear [-] (`channels.WIND_SIGNALS`).
+    """Wind of one case in time: speed v [m/s], vertical and horizontal shear [-] (`channels.WIND_SIGNALS`), azimuthal harmonics [m/s].
 
-    The local wind on the disc is v (1 + vertical_shear z/R + horizontal_shear y/R). A subclass sets `kind`,
+    The local wind on the disc is v (1 + vertical_shear z/R + horizontal_shear y/R); a blade at azimuth psi feels
+    sum c_m cos(m psi) + s_m sin(m psi) more. A subclass sets `kind`,
     gives the abstract members below, and `length` where the source has an end.
     """
 
@@ -60,11 +61,6 @@ class WindSource(ABC):
     def on(self, rotor: Rotor) -> Self:
         """The source as it blows on this rotor; itself where that makes no difference."""
         return self
-
-    @classmethod
-    @abstractmethod
-    def example(cls) -> WindSource:
-        """A small instance, at least 10 s long; what the contract tests of all sources run on."""
 
     @property
     @abstractmethod
@@ -85,6 +81,26 @@ class WindSource(ABC):
     @abstractmethod
     def cell_key(self) -> float | None:
         """Cell duration [s], None for constant signals. Winds with equal keys (or None) can share a block."""
+
+    @property
+    def harmonics(self) -> int:
+        """M: azimuthal harmonics that the blades feel. 1: the two linear shears among the three signals; 0: not even these."""
+        return 1
+
+    @property
+    def triples(self) -> int:
+        """Harmonics beside the three signals in the kernels' threes; 0 where there are none."""
+        return (kernel_rows(self.signals) - len(WIND)) // (2 * TRIPLE)
+
+    @property
+    def signals(self) -> int:
+        """Number of signals: three, and c_1, s_1, c_2, ... [m/s] of M > 1 harmonics (`wind.azimuth`), which act all along the blade."""
+        return len(WIND) + len(harmonic_channels(self.harmonics))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences that whoever uses this wind should know."""
+        return ()
 
     @property
     def length(self) -> float:
@@ -115,7 +131,7 @@ class WindSource(ABC):
         """Signals (n, n_signals) at `time` (n,) [s]. Raises InputError outside the source's length."""
         time = np.atleast_1d(np.asarray(time, float))
         if not len(time):
-            return np.empty((0, len(WIND_NAMES)))
+            return np.empty((0, self.signals))
         if not (time.min() >= 0.0 and np.isfinite(time.max())):
             raise InputError(f"wind {self.name} has no value before 0 s or at a time that is not finite")
         self._refuse_beyond(time.max())

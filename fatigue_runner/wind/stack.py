@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fatigue_runner.channels import WIND_NAMES
 from fatigue_runner.errors import InputError
+from fatigue_runner.layout import kernel_rows
 from fatigue_runner.wind.cells import cell_count
 from fatigue_runner.wind.source import WindSource
 
 
 def stack_cells(winds: Sequence[WindSource], duration: float) -> tuple[float, np.ndarray]:
-    """The cells of a block: (cell_duration [s], coefficients (n_cells, 4, n_signals, n_winds)).
+    """The cells of a block: (cell_duration [s], coefficients (n_cells, 4, rows, n_winds)), rows as `layout.kernel_rows`.
 
     Winds with `cell_key` None are constant and fit any grid with the same bits; the others must have one and
     the same key (group the cases by it). Grids are never refined to a common one: a case's bits must not
@@ -33,7 +33,8 @@ def stack_cells(winds: Sequence[WindSource], duration: float) -> tuple[float, np
         cell_duration, n_cells = keys[0], cell_count(duration, keys[0])
     else:
         cell_duration, n_cells = parts[0][0], 1
-    stacked = np.zeros((n_cells, 4, len(WIND_NAMES), len(winds)))
+    stacked = np.zeros((n_cells, 4, max(kernel_rows(w.signals) for w in winds), len(winds)))
     for lane, (_, coefficients) in enumerate(parts):
-        stacked[..., lane] = coefficients  # a constant's single cell repeats over the grid
+        # a constant's single cell repeats over the grid; harmonics that a wind does not have are zero
+        stacked[:, :, : coefficients.shape[2], lane] = coefficients
     return cell_duration, stacked

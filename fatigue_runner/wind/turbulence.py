@@ -34,21 +34,25 @@ from pydantic import Field, PlainValidator, field_validator, model_validator
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import problem
 from fatigue_runner.inputs.sweep import Sweep, expand
+from fatigue_runner.layout import WIND
 from fatigue_runner.naming import joined, speed_id, value_id
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind import rotor_modes, spectrum
+from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.checks import number, refuse_standstill
+from fatigue_runner.wind.harmonic_series import RotorTurbulence
+from fatigue_runner.wind.mean_shear import NO_TURBINE, checked_harmonics, mean_signals
+from fatigue_runner.wind.profiles import PowerLaw
+from fatigue_runner.wind.radial_weight import RadialWeight
 from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.series import periodic_cubics
 from fatigue_runner.wind.source import WindSource
-from fatigue_runner.wind.streams import uniform
+from fatigue_runner.wind.streams import speed_stream, uniform
 
 # Order n of the azimuthal mode behind each signal, in the order of `channels.WIND_SIGNALS`. A signal's place
 # is its random stream, so signals added at the end leave the others' series as they are.
 MODES = (0, 1, 1)
 AMPLITUDES = ("gaussian", "random-phase")
-# what a wind that blows on no turbine yet is made for: the NREL 5 MW
-NO_TURBINE = Rotor(63.0, 90.0)
 
 
 @dataclass(frozen=True)
@@ -79,6 +83,9 @@ class TurbulentWind(WindSource):
     hub_height: float | None = None
     amplitudes: str = "gaussian"
     scaled: bool = False
+    harmonics: int = DEFAULT_HARMONICS
+    spectrum_name: str = "kaimal"
+    disc: Rotor | None = None
 
     def __post_init__(self) -> None:
         for key, bounds in BOUNDS.items():
@@ -99,6 +106,14 @@ class TurbulentWind(WindSource):
             raise InputError(f"turbulent wind: unknown amplitudes {self.amplitudes!r}{near}")
         if not isinstance(self.scaled, bool):
             raise InputError(f"turbulent wind: scaled must be true or false, got {self.scaled!r}")
+        checked_harmonics("turbulent wind", self.harmonics)
+        if self.spectrum_name not in spectrum.SPECTRA:
+            near = did_you_mean(str(self.spectrum_name), spectrum.SPECTRA)
+            raise InputError(f"turbulent wind: unknown spectrum {self.spectrum_name!r}{near}")
+        if self.spectrum_name != "kaimal" and self.harmonics < 2:
+            raise InputError(
+                "turbulent wind: with 0 or 1 harmonics the spectrum is kaimal; take more harmonics"
+            )
         if self.duration < 4 * self.time_step:
             short = f"duration {self.duration:g} s is less than four time steps of {self.time_step:g} s"
             raise InputError(f"turbulent wind: {short}; make it longer or the time step shorter")
@@ -112,22 +127,23 @@ class TurbulentWind(WindSource):
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def on(self, rotor: Rotor) -> Self:
-        if self.rotor_radius is not None and self.hub_height is not None:
+        if self.disc is not None:
             return self
         own = self._rotor_or(rotor)
-        return replace(self, rotor_radius=own.radius, hub_height=own.hub_height)
+        return replace(self, rotor_radius=own.radius, hub_height=own.hub_height, disc=own)
 
     def _rotor_or(self, other: Rotor) -> Rotor:
         """The sizes that were given, those of `other` where none were."""
-        return Rotor(
-            other.radius if self.rotor_radius is None else self.rotor_radius,
-            other.hub_height if self.hub_height is None else self.hub_height,
+        return replace(
+            other,
+            radius=other.radius if self.rotor_radius is None else self.rotor_radius,
+            hub_height=other.hub_height if self.hub_height is None else self.hub_height,
         )
 
     @property
     def rotor(self) -> Rotor:
         """The disc that the series is made for."""
-        return self._rotor_or(NO_TURBINE)
+        return self.disc or self._rotor_or(NO_TURBINE)
 
     @property
     def name(self) -> str:
@@ -140,8 +156,12 @@ class TurbulentWind(WindSource):
 
     @property
     def mean_shear(self) -> float:
-        """Linear vertical shear of the mean wind, alpha R/H: the power law's slope at the hub."""
-        return self.shear_exponent * self.rotor.radius / self.rotor.hub_height
+        """Linear vertical shear of the mean wind: alpha R/H, the power law's slope at the hub, or its blade-effective part."""
+        return float(self._mean[1])
+
+    @cached_property
+    def _mean(self) -> np.ndarray:
+        return mean_signals(PowerLaw(self.shear_exponent), self.mean, self.rotor, self.harmonics)
 
     @property
     def sigma(self) -> float:
@@ -154,7 +174,9 @@ class TurbulentWind(WindSource):
     def parameters(self) -> dict[str, Any]:
         derived = {"vertical_shear": self.mean_shear, "horizontal_shear": 0.0}
         derived["turbulence_intensity"] = self.sigma / self.mean
-        given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("mean", "intensity")}
+        given = {
+            f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("mean", "intensity", "disc")
+        }
         return {**derived, **given, "rotor_radius": self.rotor.radius, "hub_height": self.rotor.hub_height}
 
     @property
@@ -178,7 +200,7 @@ class TurbulentWind(WindSource):
         )
         half = np.zeros((self.samples // 2 + 1, len(MODES)), complex)
         for place, variance in enumerate(variances):
-            stream = (place, round(1000 * self.mean))  # so that one seed is independent from speed to speed
+            stream = (place, *self._stream)  # so that one seed is independent from speed to speed
             power = variance
             if self.amplitudes == "gaussian":
                 power = variance * -np.log1p(-uniform(self.seed, (*stream, 1), len(variance)))
@@ -186,13 +208,48 @@ class TurbulentWind(WindSource):
             half[1:-1, place] = np.sqrt(power / 2) * np.exp(1j * phase)  # half of A = sqrt(2 * variance)
         return np.fft.irfft(half, self.samples, axis=0, norm="forward") * self.sigma
 
+    @property
+    def _stream(self) -> tuple[int, ...]:
+        """Whole thousandths as they always were; any other speed by all its digits, so that no two share a stream."""
+        thousandths = round(1000 * self.mean)
+        return (thousandths,) if thousandths / 1000 == self.mean else speed_stream(self.mean)
+
+    @cached_property
+    def harmonic_series(self) -> np.ndarray:
+        """Amplitudes c_0, c_1, s_1, ... of the fluctuation at the samples, (n, 1 + 2 M) [m/s]; of zero mean."""
+        rotor = self.rotor
+        turbulence = RotorTurbulence(
+            self.mean, rotor.radius, rotor.hub_height, RadialWeight(*rotor.weight), self.harmonics, self.samples,
+            self.time_step, self.spectrum_name, self.scaled,
+        )  # fmt: skip
+        return self.sigma * turbulence.series(self.seed, self.amplitudes == "random-phase")
+
+    def _harmonic_signals(self) -> np.ndarray:
+        """(n, 3 + 2 M): gusts move the disc mean v and the harmonics; the mean shear stays what it is in m/s."""
+        found, count = self.harmonic_series, len(WIND)
+        out = np.tile(self._mean, (len(found), 1))
+        speed = self._mean[0] + found[:, 0]
+        out[:, 1] *= self._mean[0] / speed
+        out[:, 0] = speed
+        out[:, count:] += found[:, 1:]
+        return out
+
     @cached_property
     def _coefficients(self) -> np.ndarray:
+        if self.harmonics > 1:
+            signals = self._harmonic_signals()
+            self._refuse_standstill(signals[:, :1])
+            return periodic_cubics(signals, self.time_step)
         fit = self.modal_series + np.array([self.mean, self.mean * self.mean_shear, 0.0])
         speed = fit[:, :1]
+        self._refuse_standstill(speed)
+        if self.harmonics == 0:
+            fit = fit * np.array([1.0, 0.0, 0.0])
+        return periodic_cubics(np.concatenate([speed, fit[:, 1:] / speed], axis=1), self.time_step)
+
+    def _refuse_standstill(self, speed: np.ndarray) -> None:
         way_out = "take another seed, less turbulence or more wind"
         refuse_standstill(self.name, self.time_step, periodic_cubics(speed, self.time_step), way_out)
-        return periodic_cubics(np.concatenate([speed, fit[:, 1:] / speed], axis=1), self.time_step)
 
     def _cells(self, n_cells: int) -> np.ndarray:
         return self._coefficients[:n_cells]
@@ -250,7 +307,9 @@ class TurbulentSection(WindSection):
     intensity          sigma_1 / mean speed at hub height [-], e.g. 0.14
     turbulence_class   `A+`, `A`, `B` or `C`, the IEC normal turbulence model, instead of `intensity`
     shear_exponent     power-law exponent alpha of the mean wind (default 0.2)
-    seeds              how many seeds per speed (default 1; no two speeds share one), or a list
+    seeds              how many seeds per speed (default 1), 1, 2, ... at each, or a list; one seed is another turbulence at every speed
+    harmonics          azimuthal harmonics that the blades feel: 6 (default) hold 98 % of every load range, 1 is mean and linear shears
+    spectrum           `kaimal` (default) or `von-karman`
     """
 
     kind = "turbulent"
@@ -260,6 +319,15 @@ class TurbulentSection(WindSection):
     turbulence_class: str | None = None
     shear_exponent: float | None = Field(default=None, ge=-1, le=1)
     seeds: Annotated[int | list[int], PlainValidator(_seeds)] = 1
+    harmonics: int = Field(default=DEFAULT_HARMONICS, ge=0, le=16)
+    spectrum: str = "kaimal"
+
+    @field_validator("spectrum")
+    @classmethod
+    def _spectrum_exists(cls, name: str) -> str:
+        if name not in spectrum.SPECTRA:
+            raise problem(f"{name!r} is not known{did_you_mean(name, spectrum.SPECTRA)}")
+        return name
 
     @field_validator("turbulence_class")
     @classmethod
@@ -278,15 +346,12 @@ class TurbulentSection(WindSection):
         return self
 
     def seeds_at(self, speed: float) -> list[int]:
-        """The seeds of the winds of a mean speed [m/s].
+        """The seeds of the winds of a mean speed [m/s]: 1, 2, ..., or the list as it stands.
 
-        A count gives seeds that no other speed has, because winds of one seed share their phases at all
-        speeds; they depend on nothing but the speed, so that more speeds or more seeds leave the others as
-        they are. A list is taken literally.
+        One seed is another turbulence at every speed (`streams.speed_stream`), so that more speeds or more seeds leave the others as
+        they are.
         """
-        if isinstance(self.seeds, list):
-            return self.seeds
-        return [1000 * round(100 * speed) + number for number in range(1, self.seeds + 1)]
+        return self.seeds if isinstance(self.seeds, list) else list(range(1, self.seeds + 1))
 
     def realisations(self, site: Site) -> Iterator[Realisation]:
         strength: tuple[str, Any] = ("turbulence_class", self.turbulence_class)
@@ -294,13 +359,13 @@ class TurbulentSection(WindSection):
         if self.intensity is not None:
             strength, label = ("intensity", self.intensity), f"ti{value_id(self.intensity)}"
         shear = () if self.shear_exponent is None else (("shear_exponent", self.shear_exponent),)
-        sizes = (("rotor_radius", site.rotor.radius), ("hub_height", site.rotor.hub_height))
+        more = (("harmonics", self.harmonics), ("spectrum_name", self.spectrum))
         for speed, piece in expand(self.speeds):
             for seed in self.seeds_at(speed):
                 yield Realisation(
                     joined(speed_id(speed), label, f"s{seed}"),
                     self.kind,
-                    (("mean", speed), strength, ("seed", seed), ("duration", site.duration), *shear, *sizes),
+                    (("mean", speed), strength, ("seed", seed), ("duration", site.duration), *shear, *more),
                     ("speeds", piece),
                     speed,
                 )

@@ -445,10 +445,10 @@ def test_seeds_and_shears_are_in_the_case_names_and_the_table(world, tmp_path, o
 
 
 def test_a_shear_exponent_becomes_the_linear_shear_of_this_rotor(world, tmp_path, out):
-    text = CAMPAIGN.replace("[6, 8, 10]", "8\n  shear_exponent: 0.2")
+    text = CAMPAIGN.replace("[6, 8, 10]", "8\n  shear_exponent: 0.2\n  harmonics: 1")
     row = run_campaign(write_campaign(tmp_path, text), out).rows[0]
     assert row["vertical_shear"] == pytest.approx(0.2 * 63 / 90)
-    assert row["case_id"] == "v08.00_kv0.14_rk7_10ms"
+    assert row["case_id"] == "v08.00_a0.20_rk7_10ms"
 
 
 def test_dask_without_its_package_is_refused_with_the_pip_command(world, campaign, out):

@@ -16,7 +16,7 @@ CAMPAIGN = {
     "duration": 6,
     "output_rate": 50,
     "discard": 1,
-    "wind": {"type": "turbulent", "speeds": [7, 9], "intensity": 0.1, "seeds": [1]},
+    "wind": {"type": "turbulent", "speeds": [7, 9], "intensity": 0.1, "seeds": [1], "harmonics": 1},
     "integrators": [{"method": "rk4", "step": 0.05}],
     "reference": {"method": "rk7", "step": 0.01},
     "workers": 1,

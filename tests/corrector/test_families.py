@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from corrector_example import operating_points, turbine
 from places import CORRECTORS
+from simulating import simulate_block
 from typer.testing import CliRunner
 
 from fatigue_runner.cli import app
@@ -16,7 +17,6 @@ from fatigue_runner.corrector import CorrectorError, families, library, load, sa
 from fatigue_runner.corrector.maps import MAPS, map_class
 from fatigue_runner.corrector.recipe import FAMILIES
 from fatigue_runner.corrector.train import read_recipe, train
-from fatigue_runner.integrators import simulate_block
 from fatigue_runner.wind import ConstantWind
 
 # A family in one file: the defect is taken to be the mean of the training set's, with a map and compiled code of its own.

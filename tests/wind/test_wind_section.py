@@ -101,8 +101,8 @@ def test_a_key_that_would_be_ignored_is_refused():
 @pytest.mark.parametrize("name", TURBULENCE_CLASSES)
 def test_every_turbulence_class_of_the_source_works_in_a_campaign(name):
     (found,) = winds_of({"type": "turbulent", "speeds": 8, "turbulence_class": name})
-    assert found.build().sigma == TurbulentWind(8.0, turbulence_class=name).sigma
-    assert found.id == f"v08.00_ntm{name}_s800001"
+    assert found.build(LARGE).sigma == TurbulentWind(8.0, turbulence_class=name).sigma
+    assert found.id == f"v08.00_ntm{name}_s1"
 
 
 def test_an_unknown_turbulence_class_is_refused():
@@ -112,7 +112,7 @@ def test_an_unknown_turbulence_class_is_refused():
 
 def test_a_campaigns_turbulence_is_made_for_its_turbine():
     (found,) = winds_of({"type": "turbulent", "speeds": 8, "intensity": 0.1})
-    assert found.build().rotor == LARGE
+    assert found.build(LARGE).rotor == LARGE
 
 
 def test_a_missing_wind_file_is_told_with_its_place(tmp_path):
@@ -143,7 +143,7 @@ def test_turbulence_is_that_of_the_rotor_it_blows_on():
         TurbulentWind(8.0, None, "A", 0, 600.0, 0.2, 0.2, 63.0, 90.0),
     )
     assert open_.on(LARGE).rotor == LARGE
-    assert given.on(LARGE) is given
+    assert given.on(LARGE).rotor == Rotor(63.0, 90.0)
     # a larger disc averages more of the eddies away
     assert open_.on(LARGE).at(np.arange(0.0, 600.0))[:, 0].std() < open_.at(np.arange(0.0, 600.0))[:, 0].std()
 

@@ -127,7 +127,9 @@ def _step_work(turbine: Any, method: str, step: float = 0.01, duration: float = 
     from fatigue_runner.integrators import Ensemble, Integrator, simulate
     from fatigue_runner.wind import TurbulentWind
 
-    winds = [TurbulentWind(8.0, intensity=0.14, seed=seed, duration=duration) for seed in range(16)]
+    winds = [
+        TurbulentWind(8.0, intensity=0.14, seed=seed, duration=duration, harmonics=1) for seed in range(16)
+    ]
     initial = np.repeat(turbine.operating_point(8.0)[None], 16, axis=0)
     ensemble, integrator = Ensemble(turbine, winds, initial, duration, 0.02), Integrator(method, step)
 

@@ -32,7 +32,7 @@ def measure(
     if FIRST_SEED + seeds > SEEDS.stop:
         raise InputError(f"at most {SEEDS.stop - FIRST_SEED} seeds are kept for benchmarks, got {seeds}")
     winds = [
-        TurbulentWind(float(v), intensity=INTENSITY, seed=FIRST_SEED + i, duration=duration)
+        TurbulentWind(float(v), intensity=INTENSITY, seed=FIRST_SEED + i, duration=duration, harmonics=1)
         for i, v in enumerate(np.linspace(*SPEEDS, seeds))
     ]
     rows = []

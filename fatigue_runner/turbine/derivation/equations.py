@@ -120,6 +120,8 @@ P = {name: sp.Symbol(name, real=True) for name in PARAMETERS}
 STATE = sp.symbols("a s f1 f2 f3 e phi gen ad sd f1d f2d f3d ed phid gend", real=True)
 ACCELERATION = sp.symbols("add sdd f1dd f2dd f3dd edd phidd gendd", real=True)
 WIND = sp.symbols("v kv kh", real=True)
+# what the wind's azimuthal harmonics add at the blades, uniform along them: mean + cos cos(alpha_i) + sin sin(alpha_i)
+FOLDED = sp.symbols("w_fold_mean w_fold_cos w_fold_sin", real=True)
 SINE, COSINE = sp.symbols("sin_phi cos_phi", real=True)
 
 # Coefficients of one blade's aerodynamic loads; the equations read the first 32 (whole vectors of 8), the load channels all.
@@ -134,6 +136,11 @@ TABLES = (
     "tangential", "tangential_edge", "bending", "bending_edge", "edge_kappa", "edge_y", "edge_skew",
 )  # fmt: skip
 TABLES_OF_THE_EQUATIONS = 32
+# the loads' derivatives by a wind that is the same all along the blade, for winds with azimuthal harmonics
+UNIFORM_TABLES = ("thrust_w", "flap_w", "torque_w", "edge_w", "tangential_w", "bending_w")
+_OWN = 29  # tables without which the equations do not do
+HARMONIC_TABLES = (*TABLES[:_OWN], *UNIFORM_TABLES, *TABLES[_OWN:])
+HARMONIC_TABLES_OF_THE_EQUATIONS = _OWN + len(UNIFORM_TABLES)
 
 HALF_SQRT3 = sp.Symbol(
     "half_sqrt3", real=True
@@ -692,7 +699,7 @@ def coned(sheet: Sheet, name: str, v, number: int) -> sp.Matrix:
 
 # --- applied forces ----------------------------------------------------------------------------------------------------
 
-TABLE = {name: sp.Symbol(f"c_{name}", real=True) for name in TABLES}
+TABLE = {name: sp.Symbol(f"c_{name}", real=True) for name in HARMONIC_TABLES}
 TIP_SPEED_RATIO = sp.Symbol("tip_speed_ratio", real=True)
 
 
@@ -705,6 +712,9 @@ class Aerodynamics:
     inplane: tuple[sp.Expr, sp.Expr]  # V y_i
     skew: tuple[sp.Expr, sp.Expr]  # in-plane wind along the blade, outwards
     pressure: sp.Expr  # rho A V / 6: a blade's third of rho/2 A V
+    uniform: tuple[
+        sp.Expr, ...
+    ] = ()  # mean, cos and sin part of the wind that the harmonics add along the shaft; or nothing
 
     def load(self, name: str, number: int) -> sp.Expr:
         """One blade's coefficient times velocity; times `pressure` (and R) it is the load."""
@@ -712,32 +722,48 @@ class Aerodynamics:
         total = TABLE[name] * self.normal
         for key, (pc, ps) in (("kappa", self.kappa), ("y", self.inplane), ("skew", self.skew)):
             total += TABLE[f"{name}_{key}"] * (pc * c + ps * s) if f"{name}_{key}" in TABLE else 0
+        if self.uniform:
+            mean, uc, us = self.uniform
+            total += TABLE[f"{name}_w"] * (mean + uc * c + us * s)
         flap = TABLE[f"{name}_flap"] * STATE[9 + number]
         return total + flap + (TABLE[f"{name}_edge"] * STATE[13] if f"{name}_edge" in TABLE else 0)
 
+    def parts(self) -> list[tuple[str, tuple[sp.Expr, ...]]]:
+        """(table's suffix, cos and sin part) of everything periodic."""
+        own: list[tuple[str, tuple[sp.Expr, ...]]] = [
+            ("kappa", self.kappa), ("y", self.inplane), ("skew", self.skew)
+        ]  # fmt: skip
+        return own + ([("w", self.uniform[1:])] if self.uniform else [])
+
+    def of_uniform(self, name: str, i: int) -> sp.Expr:
+        """What part i of the harmonics' wind makes of a load."""
+        return TABLE[f"{name}_w"] * self.uniform[i] if self.uniform else sp.Integer(0)
+
     def flapwise(self) -> list[sp.Expr]:
         """The generalised flap force of a blade that does not flap, by harmonics; times `pressure`."""
-        mean = TABLE["flap"] * self.normal + TABLE["flap_edge"] * STATE[13]
-        parts = ("kappa", self.kappa), ("y", self.inplane), ("skew", self.skew)
+        mean = TABLE["flap"] * self.normal + TABLE["flap_edge"] * STATE[13] + self.of_uniform("flap", 0)
+        parts = self.parts()
         return [mean, *(sum(TABLE[f"flap_{key}"] * part[i] for key, part in parts) for i in (0, 1))]
 
     def mean(self, name: str) -> sp.Expr:
         """A third of the sum over the blades."""
-        flap = TABLE[f"{name}_flap"] * harmonic_symbols("d")[0]
+        flap = TABLE[f"{name}_flap"] * harmonic_symbols("d")[0] + self.of_uniform(name, 0)
         return TABLE[name] * self.normal + TABLE[f"{name}_edge"] * STATE[13] + flap
 
     def harmonic(self, name: str) -> tuple[sp.Expr, sp.Expr]:
         """Two thirds of the sums weighted with cos and sin of the blade's place; what all blades share drops out."""
         out = []
         for i, rate in enumerate(harmonic_symbols("d")[1:]):
-            parts = ("kappa", self.kappa), ("y", self.inplane), ("skew", self.skew)
-            periodic = sum(TABLE[f"{name}_{key}"] * part[i] for key, part in parts)
+            periodic = sum(TABLE[f"{name}_{key}"] * part[i] for key, part in self.parts())
             out.append(periodic + TABLE[f"{name}_flap"] * rate)
         return out[0], out[1]
 
 
-def inflow(sheet: Sheet, m: Motion) -> Aerodynamics:
-    """Relative wind at the hub, in F, and the tip-speed ratio of the look-up."""
+def inflow(sheet: Sheet, m: Motion, harmonics: bool) -> Aerodynamics:
+    """Relative wind at the hub, in F, and the tip-speed ratio of the look-up; harmonics: whether blades feel azimuthal ones.
+
+    Of the harmonics' wind, the part along the shaft acts on the blades; across the rotor it would be a few per cent of a fluctuation.
+    """
     v, kv, kh = WIND
     ad, sd = STATE[8:10]
     cos_a, sin_a, cos_r, sin_r = sp.symbols("pitch_cos pitch_sin roll_cos roll_sin", real=True)
@@ -754,7 +780,9 @@ def inflow(sheet: Sheet, m: Motion) -> Aerodynamics:
     # e3 = (0, -sin, cos): a blade that points where the wind blows across the rotor lies in more of the wake. The wake leans
     # with the wind; it does not follow the tower's swaying.
     skew = tuple(sheet.let(f"skew_{n}", x) for n, x in (("cos", wind[2]), ("sin", -wind[1])))
-    return Aerodynamics(normal, (kc, ks), (relative[1], relative[2]), skew, pressure)
+    folded = zip(("mean", "cos", "sin"), FOLDED, strict=True) if harmonics else ()
+    uniform = tuple(sheet.let(f"uniform_{n}", P["cos_tilt"] * x) for n, x in folded)
+    return Aerodynamics(normal, (kc, ks), (relative[1], relative[2]), skew, pressure, uniform)
 
 
 def aero_resultant(sheet: Sheet, aero: Aerodynamics) -> tuple[sp.Matrix, sp.Matrix]:
@@ -816,12 +844,12 @@ def tower_and_nacelle(sheet: Sheet, top: Motion) -> tuple[dict[str, sp.Expr], di
     return mass, force
 
 
-def accelerations() -> tuple[Sheet, tuple[sp.Expr, ...]]:
-    """The whole model: a sheet of assignments, and the 8 accelerations."""
+def accelerations(harmonics: bool = False) -> tuple[Sheet, tuple[sp.Expr, ...]]:
+    """The whole model: a sheet of assignments, and the 8 accelerations; harmonics: see `inflow`."""
     sheet = Sheet()
     top = tower_top(sheet)
     m = hub(sheet, top)
-    aero = inflow(sheet, m)
+    aero = inflow(sheet, m, harmonics)
     r = rotor(sheet, m)
     mass, force = tower_and_nacelle(sheet, top)
 
@@ -987,13 +1015,13 @@ def from_blade(v, number: int) -> sp.Matrix:
     return rot_x_t(c, -s, cone(v))
 
 
-def load_channels() -> tuple[Sheet, dict[str, sp.Expr]]:
-    """Loads by their channel names from states, wind and the accelerations (`ACCELERATION`)."""
+def load_channels(harmonics: bool = False) -> tuple[Sheet, dict[str, sp.Expr]]:
+    """Loads by their channel names from states, wind and the accelerations (`ACCELERATION`); harmonics: see `inflow`."""
     sheet = Sheet()
     harmonic_sums(sheet, ("d",))
     top = tower_top(sheet)
     m = hub(sheet, top)
-    aero = inflow(sheet, m)
+    aero = inflow(sheet, m, harmonics)
     phidd = ACCELERATION[6]
     rotating = full_motion(m, sheet, "hub", phidd)
     out: dict[str, sp.Expr] = {}

@@ -44,6 +44,15 @@ class Variant:
         return {name: _OWN.get(name, sp.Symbol(name, real=True)) for name in names}
 
     @property
+    def tables(self) -> tuple[str, ...]:
+        """Names of the coefficients, those of the equations first."""
+        return eq.HARMONIC_TABLES if self.layout.harmonics else eq.TABLES
+
+    @property
+    def equation_tables(self) -> int:
+        return eq.HARMONIC_TABLES_OF_THE_EQUATIONS if self.layout.harmonics else eq.TABLES_OF_THE_EQUATIONS
+
+    @property
     def inputs(self) -> dict[sp.Symbol, str]:
         """Where the kernels read each of them."""
         symbols = self.symbols
@@ -184,6 +193,11 @@ def kernel(
         source.append(f"{PITCH} = {inputs.pop(PITCH)}")
     source += SINE_COSINE.format(sine=horner(1, 9), cosine=horner(0, 10)).rstrip("\n").split("\n")
 
+    if variant.layout.harmonics:
+        source.append(
+            f"{', '.join(map(str, eq.FOLDED))} = harmonics(wind, {len(variant.layout.wind)}, cos_phi, sin_phi)"
+        )
+
     def write(target: str, expr: sp.Expr) -> None:
         for symbol in sorted(expr.free_symbols & inputs.keys(), key=str):
             source.append(f"{symbol} = {inputs.pop(symbol)}")
@@ -238,8 +252,8 @@ def constants(parameters):
 def module(variant: Variant) -> str:
     """A generated module: its head, the constants, and the kernels `rhs` and `loads`."""
     layout = variant.layout
-    sheet, accelerations = eq.accelerations()
-    load_sheet, loads = eq.load_channels()
+    sheet, accelerations = eq.accelerations(layout.harmonics)
+    load_sheet, loads = eq.load_channels(layout.harmonics)
     out = dict(enumerate(eq.STATE[layout.freedoms :])) | {
         layout.freedoms + i: a for i, a in enumerate(accelerations)
     }
@@ -258,7 +272,7 @@ def module(variant: Variant) -> str:
         **sheet.constants,
         **{rename[s]: e.xreplace(rename) for s, e in load_sheet.constants.items()},
     }
-    tables = eq.TABLES[: eq.TABLES_OF_THE_EQUATIONS]
+    tables = variant.tables[: variant.equation_tables]
     sizes = (
         f"({layout.size}, LANES), wind ({len(layout.wind)}, LANES), control ({len(layout.control)}, LANES)"
     )
@@ -266,11 +280,11 @@ def module(variant: Variant) -> str:
         kernel("rhs", f"State derivative of LANES cases: x, out[start:] in blocks {sizes}.",
                variant, sheet, out, False, tables, symbols),
         kernel("loads", f"Load channels of LANES states: x, derivative {sizes}, out (k, LANES).",
-               variant, load_sheet, load_out, True, eq.TABLES, symbols),
+               variant, load_sheet, load_out, True, variant.tables, symbols),
     ]  # fmt: skip
     head = HEAD.format(
-        doc=variant.doc, source=variant.source, parameters=repr(tuple(eq.PARAMETERS)), tables=repr(eq.TABLES),
-        width=eq.TABLES_OF_THE_EQUATIONS, loads=repr(LOAD_NAMES), turned=" at zero pitch" if variant.varying_pitch else "",
+        doc=variant.doc, source=variant.source, parameters=repr(tuple(eq.PARAMETERS)), tables=repr(variant.tables),
+        width=variant.equation_tables, loads=repr(LOAD_NAMES), turned=" at zero pitch" if variant.varying_pitch else "",
     )  # fmt: skip
     lines = [f"    {name} = p[{name!r}]" for name in eq.PARAMETERS]
     lines += [f"    {s} = {PRINT(e)}" for s, e in definitions.items()]
@@ -285,6 +299,17 @@ VARIANTS = {
         "The lane kernels with each lane's pitch [rad] as a control signal.",
         f"{_FOLDER}/equations.py and pitching.py",
         VARYING_PITCH.layout,
+        varying_pitch=True,
+    ),
+    "harmonic": Variant(
+        "The lane kernels at a fixed pitch, under wind with azimuthal harmonics.",
+        f"{_FOLDER}/equations.py",
+        FIXED_PITCH.layout.extended(harmonics=True),
+    ),
+    "pitched_harmonic": Variant(
+        "The lane kernels with each lane's pitch [rad] as a control signal, under wind with azimuthal harmonics.",
+        f"{_FOLDER}/equations.py and pitching.py",
+        VARYING_PITCH.layout.extended(harmonics=True),
         varying_pitch=True,
     ),
 }

@@ -1,0 +1,71 @@
+"""The mean wind over the rotor as signals: disc mean, linear shears, and what a profile has beyond them as harmonics.
+
+m = 1 of the mean wind keeps the linear profile along the blade that shears have, with the slope whose blade-effective part is the
+profile's; m = 2 and up act all along the blade, as those of turbulence.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from fatigue_runner.errors import InputError
+from fatigue_runner.layout import WIND
+from fatigue_runner.rotor import Rotor
+from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS, MOST_HARMONICS
+from fatigue_runner.wind.profiles import PowerLaw, Profile, profile_amplitudes, profile_disc_fit
+from fatigue_runner.wind.radial_weight import RadialWeight
+
+# what a wind that blows on no turbine yet is made for: the NREL 5 MW
+NO_TURBINE = Rotor(63.0, 90.0)
+
+
+def checked_harmonics(what: str, harmonics: Any) -> int:
+    """M; raises InputError for what is no whole number from 0 to the most that a wind has."""
+    whole = isinstance(harmonics, int | np.integer) and not isinstance(harmonics, bool)
+    if not whole or not 0 <= harmonics <= MOST_HARMONICS:
+        raise InputError(
+            f"{what}: harmonics must be a whole number from 0 to {MOST_HARMONICS}, got {harmonics!r}; "
+            f"{DEFAULT_HARMONICS} hold 98 % of every load range, 1 is linear shear only"
+        )
+    return int(harmonics)
+
+
+def checked_order(what: str, harmonics: Any, shear_exponent: Any, vertical_shear: float) -> int | None:
+    """M of a steady wind: as given, or the default where there is a power law. Raises InputError for what contradicts itself."""
+    if shear_exponent is None:
+        if harmonics is not None and checked_harmonics(what, harmonics) > 1:
+            raise InputError(
+                f"{what}: a linear shear has one harmonic, not {harmonics}; give shear_exponent for a power law"
+            )
+        return None
+    PowerLaw(shear_exponent)  # raises for an impossible one
+    if vertical_shear:
+        raise InputError(f"{what} has both vertical_shear and shear_exponent; give one of the two")
+    return DEFAULT_HARMONICS if harmonics is None else checked_harmonics(what, harmonics)
+
+
+@lru_cache(maxsize=64)
+def radial_rule(rotor: Rotor) -> tuple[np.ndarray, np.ndarray, float]:
+    """Radii (k,) [m], their shares (k,) in the blade-effective wind, and its mean radius over R."""
+    rho, shares = RadialWeight(*rotor.weight).rule()
+    return rho * rotor.radius, shares, float(shares @ rho)
+
+
+def mean_signals(profile: Profile, speed: float, rotor: Rotor, harmonics: int) -> np.ndarray:
+    """Signals (3 + 2 M,) of a profile with `speed` [m/s] at hub height; (3,) for M of 0 (no shear) and 1 (the slope at the hub)."""
+    if harmonics < 2:
+        slope = profile.factor(np.array([1.001, 0.999]) * rotor.hub_height, rotor.hub_height)
+        kappa = float(slope[0] - slope[1]) / 0.002 * rotor.radius / rotor.hub_height
+        if isinstance(profile, PowerLaw):
+            kappa = profile.exponent * rotor.radius / rotor.hub_height
+        return np.array([speed, kappa if harmonics else 0.0, 0.0])
+    radii, shares, mean_radius = radial_rule(rotor)
+    amplitudes = profile_amplitudes(profile, rotor.hub_height, radii, shares, harmonics)
+    disc = profile_disc_fit(profile, rotor.hub_height, rotor.radius)
+    out = np.zeros(len(WIND) + 2 * harmonics)
+    out[0], out[1] = speed * disc[0], amplitudes[1] / mean_radius / disc[0]
+    out[len(WIND) + 2 :] = speed * amplitudes[3:]
+    return out

@@ -1,0 +1,129 @@
+"""Wind with azimuthal harmonics as sources and kernels have it: what each blade feels at its own azimuth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from field_files import some_field, write_bts
+from simulating import simulate_block
+
+from fatigue_runner.errors import InputError
+from fatigue_runner.turbine import load_turbine
+from fatigue_runner.turbine.lanes import evaluate
+from fatigue_runner.wind import ConstantWind, FullFieldWind, TurbulentWind
+from fatigue_runner.wind.azimuth import wind_at
+
+
+@pytest.fixture(scope="module")
+def turbine():
+    return load_turbine("nrel5mw")
+
+
+def folded(turbine, state, signals):
+    """State derivatives under any wind signals (n, 3 or more)."""
+    padded = np.zeros((3 + 6 * -(-(signals.shape[1] - 3) // 6), len(signals)))
+    padded[: signals.shape[1]] = signals.T
+    return evaluate(turbine.kernel_data(0.0, True), state, padded)[0]
+
+
+def test_without_amplitudes_the_kernel_with_harmonics_is_the_plain_one(turbine):
+    x = np.repeat(turbine.operating_point(8.0)[:, None], 5, axis=1)
+    x[6] = np.linspace(0, 6, 5)
+    signals = np.tile([8.0, 0.1, -0.05, *[0.0] * 12], (5, 1))
+    assert folded(turbine, x, signals) == pytest.approx(turbine.rhs(x, 8.0, 0.1, -0.05), rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("harmonics", [2, 3, 4, 6, 7])
+def test_the_three_blades_feel_the_harmonics_at_their_own_azimuths(turbine, harmonics):
+    """Amplitudes that give three blades the same winds give the same accelerations, whatever their orders."""
+    random = np.random.default_rng(harmonics)
+    n = 11
+    x = np.repeat(turbine.operating_point(8.0)[:, None], n, axis=1)
+    x[6] = random.uniform(0, 20, n)
+    x[7] = 97.0 * x[6]
+    amplitudes = np.zeros((n, 1 + 2 * harmonics))
+    amplitudes[:, 1:] = random.normal(0, 0.5, (n, 2 * harmonics))
+    # three winds at three blades are a mean (an m = 3) and an m = 1 with these amplitudes
+    psi = x[6][:, None] + np.arange(3) * 2 * np.pi / 3
+    winds = np.array([wind_at(a, p) for a, p in zip(amplitudes, psi, strict=True)])
+    mean = winds.mean(axis=1)
+    c1, s1 = (2 / 3 * (winds * f(psi)).sum(axis=1) for f in (np.cos, np.sin))
+    same = np.zeros((n, 7))
+    same[:, 1], same[:, 2] = c1, s1
+    same[:, 5], same[:, 6] = mean * np.cos(3 * x[6]), mean * np.sin(3 * x[6])
+
+    def slopes(a):
+        signals = np.concatenate([np.tile([8.0, 0.0, 0.0], (n, 1)), a[:, 1:]], axis=1)
+        return folded(turbine, x, signals)
+
+    assert slopes(amplitudes) == pytest.approx(slopes(same), rel=1e-9, abs=1e-9)
+    assert np.abs(slopes(amplitudes)[10:13] - turbine.rhs(x, 8.0)[10:13]).max() > 0.1
+
+
+def test_a_wind_that_rises_everywhere_is_a_faster_wind_at_the_same_rotor_speed(turbine):
+    """c_3 cos 3 psi at psi = 0 lifts all three blades' winds: to first order the disc's wind rises by as much."""
+    x = turbine.operating_point(8.0)[:, None]
+    x[6] = 0.0
+    step = 1e-3
+    signals = np.zeros((1, 9))
+    signals[0, 0], signals[0, 7] = 8.0, step
+    risen = (folded(turbine, x, signals) - turbine.rhs(x, 8.0)) / step
+    faster = (turbine.rhs(x, 8.0 + step) - turbine.rhs(x, 8.0 - step)) / (2 * step)
+    # harmonics have no wind along the tilted rotor plane, which pushes the two lower blades apart
+    for rows in ([8], [10, 11, 12], [14]):
+        assert risen[rows].mean() == pytest.approx(faster[rows].mean(), rel=0.01)
+
+
+def test_the_power_law_has_its_harmonics_and_the_same_blade_effective_slope(turbine):
+    wind = ConstantWind(8.0, shear_exponent=0.2).on(turbine.rotor)
+    signals = wind.at([0.0])[0]
+    assert wind.harmonics == 6 and signals.shape == (15,)
+    assert signals[0] == pytest.approx(8.0, rel=0.015) and signals[0] < 8.0  # the power law is concave
+    assert signals[5] < 0 < signals[7]  # cos 2 psi lowers, cos 3 psi raises
+    assert not signals[4::2].any()
+
+
+def test_linear_shear_has_one_harmonic_and_says_so():
+    assert ConstantWind(8.0, 0.1).harmonics == 1 and ConstantWind(8.0, 0.1).at([0.0]).shape == (1, 3)
+    with pytest.raises(InputError, match="a linear shear has one harmonic, not 3; give shear_exponent"):
+        ConstantWind(8.0, 0.1, harmonics=3)
+    with pytest.raises(InputError, match="both vertical_shear and shear_exponent"):
+        ConstantWind(8.0, 0.1, shear_exponent=0.2)
+
+
+@pytest.mark.parametrize("harmonics", [-1, 2.5, 99, True])
+def test_an_impossible_number_of_harmonics_is_refused(harmonics):
+    with pytest.raises(InputError, match="harmonics must be a whole number from 0 to 16"):
+        TurbulentWind(8.0, 0.1, harmonics=harmonics)
+
+
+def test_uniform_wind_has_no_shear_at_all():
+    signals = TurbulentWind(8.0, 0.1, harmonics=0, duration=20.0).at(np.arange(20.0))
+    assert not signals[:, 1:].any() and signals[:, 0].std() > 0
+
+
+def test_winds_of_any_number_of_harmonics_run_side_by_side_with_the_bits_of_each_alone(turbine):
+    winds = [
+        TurbulentWind(8.0, 0.1, seed=1, duration=10.0, harmonics=m) for m in (1, 3, 6)
+    ] + [ConstantWind(8.0, shear_exponent=0.2), ConstantWind(8.0)]  # fmt: skip
+    start = np.repeat(turbine.operating_point(8.0)[None], len(winds), axis=0)
+    for method, step in (("rk4", 0.05), ("etdabm3", 0.05)):
+        together = simulate_block(turbine, method, step, winds, start, 5.0, 0.05)
+        for wind, x, run in zip(winds, start, together, strict=True):
+            (alone,) = simulate_block(turbine, method, step, [wind], x[None], 5.0, 0.05)
+            assert np.array_equal(alone.state, run.state) and np.array_equal(
+                alone.wind, run.wind, equal_nan=True
+            )
+            assert run.wind.shape[1] == wind.on(turbine.rotor).signals
+
+
+def test_a_full_field_blows_as_its_projection_says(turbine, tmp_path):
+    path = write_bts(
+        tmp_path / "a.bts", some_field(300, 15, 15), spacing=(10.0, 10.0), mean=9.0, hub=90.0, time_step=0.1
+    )
+    wind = FullFieldWind(path, harmonics=3).on(turbine.rotor)
+    assert wind.signals == 9 and wind.mean_speed == 9.0
+    (run,) = simulate_block(turbine, "rk4", 0.05, [wind], turbine.operating_point(9.0)[None], 10.0, 0.1)
+    assert run.diverged_at is None and run.wind.std(axis=0)[3:].min() > 0
+    with pytest.raises(InputError, match="cannot be read"):
+        FullFieldWind(tmp_path / "gone.bts").on(turbine.rotor).at([0.0])
