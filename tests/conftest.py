@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import joblib
 import pytest
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
+
+# Before numpy is loaded: several processes share the cores, and threads of BLAS that wait for each other take ten times as long.
+for _library in ("OPENBLAS", "MKL", "OMP"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 # More do not pay: every process loads the kernels anew, and campaigns under test start workers of their own.
 MOST_PROCESSES = 4
@@ -19,8 +23,10 @@ MOST_PROCESSES = 4
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """For `-n auto` (pyproject.toml): none for files or names that somebody picked, where starting processes takes longest."""
+    from joblib import cpu_count
+
     everything = config.args_source is config.ArgsSource.TESTPATHS and not config.option.keyword
-    return min(MOST_PROCESSES, joblib.cpu_count()) if everything else 0
+    return min(MOST_PROCESSES, cpu_count()) if everything else 0
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:

@@ -79,6 +79,7 @@ def _connect(experimental: Any, process: Any, port: int) -> Any:
         try:
             client = experimental.ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
             client.get_state()
+            client.take_screenshot()  # one without a graphics library answers, and ends when it shall draw
             return client
         except Exception as error:  # the client is experimental: any error means "not yet"
             trouble = error

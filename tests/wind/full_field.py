@@ -41,24 +41,29 @@ class FullField:
         r = self.distance
         return np.exp(-12 * np.sqrt((frequency * r / self.mean) ** 2 + (0.12 * r / self.scale) ** 2))
 
-    def simulate(self, runs, seed=0):
-        """Fluctuation at all points, (runs, samples, points) [m/s]."""
-        phase = np.random.default_rng(seed).random((len(self.frequency), len(self.y), runs)) * 2 * np.pi
-        half = np.zeros((runs, self.samples // 2 + 1, len(self.y)), complex)
+    def simulate(self, runs, seed=0, onto=None):
+        """Fluctuation at all points, (runs, samples, points) [m/s].
+
+        onto (n, points): weighted sums over the points instead, (runs, samples, n); taken before the inverse transform they cost next
+        to nothing.
+        """
+        random = np.random.default_rng(seed)
+        sums = np.eye(len(self.y)) if onto is None else onto
+        half = np.zeros((runs, self.samples // 2 + 1, len(sums)), complex)
         for k, frequency in enumerate(self.frequency):
             amplitude = np.sqrt(2 * self.spectrum(frequency) / self.period)
-            factor = amplitude * np.linalg.cholesky(self.coherence(frequency))
-            half[:, k + 1] = (factor @ np.exp(1j * phase[k])).T
+            factor = amplitude * sums @ np.linalg.cholesky(self.coherence(frequency))
+            phase = 2 * np.pi * random.random((len(self.y), runs))
+            half[:, k + 1] = (factor @ np.cos(phase) + 1j * (factor @ np.sin(phase))).T
         return np.fft.irfft(half, self.samples, axis=1) * self.samples / 2
 
     def expected_matrix(self, frequency):
         """Spectral matrix of (v, slope along z, slope along y) that the points have on average."""
         return self.spectrum(frequency) * self.fit @ self.coherence(frequency) @ self.fit.T
 
-    def parameters(self, fluctuation, shear):
-        """(v, kappa_v, kappa_h), (..., 3), of the field V (1 + shear z/R) + u': its least-squares plane."""
-        field = self.mean * (1 + shear * self.z) + fluctuation
-        v, slope_z, slope_y = np.moveaxis(field @ self.fit.T, -1, 0)
+    def parameters(self, planes, shear):
+        """(v, kappa_v, kappa_h), (..., 3), of the field V (1 + shear z/R) + u'; planes (..., 3): u' onto `fit`."""
+        v, slope_z, slope_y = np.moveaxis(planes + self.mean * np.array([1.0, shear, 0.0]), -1, 0)
         return np.stack([v, slope_z / v, slope_y / v], axis=-1)
 
 

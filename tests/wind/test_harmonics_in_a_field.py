@@ -38,17 +38,13 @@ def test_a_field_has_on_average_the_spectra_of_the_harmonics_and_no_cross_spectr
         assert abs(matrix - np.diag(np.diag(matrix))).max() < 1e-10 * expected.max()
 
 
-def compare(mean, field, runs, batches, harmonics, bias):
+def compare(mean, field, runs_of_both, harmonics, bias):
     """Variances, spectra in bands and cross-spectra of a field's amplitudes and of the signals' agree.
 
     Within the sampling error of as many runs of both, and the share `bias` that the field's points have too much.
     """
-    rows, wind, runs_of_both = (
-        field.rows(harmonics).T,
-        signals(mean, harmonics, field.samples, 1.0),
-        runs * batches,
-    )
-    simulated = np.concatenate([field.simulate(runs, seed) @ rows for seed in range(batches)])
+    wind = signals(mean, harmonics, field.samples, 1.0)
+    simulated = field.simulate(runs_of_both, 0, onto=field.rows(harmonics))
     drawn = np.array([wind.series(seed) for seed in range(runs_of_both)])
     lines = wind.variances()[orders(harmonics)]
     scatter = np.sqrt((lines**2).sum(axis=1)) / lines.sum(axis=1)  # of the variance of one Gaussian run
@@ -70,14 +66,14 @@ def compare(mean, field, runs, batches, harmonics, bias):
 
 def test_a_field_on_circles_has_the_variances_and_spectra_of_the_signals():
     field = PolarField(10.0, 1.0, BLADE.at, circles=6, angles=24)
-    compare(10.0, field, runs=80, batches=1, harmonics=3, bias=0.08)
+    compare(10.0, field, runs_of_both=80, harmonics=3, bias=0.08)
 
 
 @pytest.mark.slow(reason="two hundred runs of a field of 576 points at each of three wind speeds")
 @pytest.mark.parametrize("mean", [6.0, 10.0, 18.0])
 def test_a_fine_field_confirms_the_signals_closely(mean):
     field = PolarField(mean, 1.0, BLADE.at, circles=12, angles=48)
-    compare(mean, field, runs=40, batches=5, harmonics=4, bias=0.03)
+    compare(mean, field, runs_of_both=200, harmonics=4, bias=0.03)
 
 
 # Fatigue
@@ -108,7 +104,7 @@ def kept():
     ratios = {}
     for mean in ROTOR_SPEED:
         field = GridField(mean, 1.0, BLADE.at, time_step=0.2)
-        fluctuation, turns = field.simulate(4, seed=int(mean)), azimuths(mean, field.samples, 0.2)
+        fluctuation, turns = field.simulate(4, int(mean)), azimuths(mean, field.samples, 0.2)
         full = loads([field.blade(fluctuation, turn) for turn in turns], 0.2)
         amplitudes = fluctuation @ field.rows(6).T
         ratios[mean] = {
@@ -147,7 +143,7 @@ def test_fewer_harmonics_lose_what_the_documentation_says(kept, mean, harmonics,
 def test_signals_from_the_spectrum_load_a_turbine_as_a_field_does(mean):
     field = PolarField(mean, 1.0, BLADE.at, circles=12, angles=48, time_step=0.25)
     turns = azimuths(mean, field.samples, 0.25)
-    amplitudes = np.concatenate([field.simulate(8, seed) @ field.rows(16).T for seed in range(2)])
+    amplitudes = field.simulate(16, 0, onto=field.rows(16))
     wind = signals(mean, DEFAULT_HARMONICS, field.samples, 0.25)
     drawn = np.array([wind.series(seed) for seed in range(64)])
     of_signals, of_field = (loads([turning(a, turn) for turn in turns], 0.25) for a in (drawn, amplitudes))

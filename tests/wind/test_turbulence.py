@@ -321,17 +321,16 @@ def test_the_full_field_has_on_average_the_spectra_of_the_projected_signals():
         assert abs(matrix - np.diag(np.diag(matrix))).max() < 1e-10
 
 
-def ensembles(mean, across, runs, batches):
+def ensembles(mean, across, runs):
     """Signals of the full field's fit and of the projection, (runs, 600, 3) each, one sample a second."""
     shear = 0.2 * R / H
     field = FullField(mean, 0.14 * mean, across=across)
-    fitted = [field.parameters(field.simulate(runs, seed), shear) for seed in range(batches)]
+    fitted = field.parameters(field.simulate(runs, 0, onto=field.fit), shear)
     time = np.arange(600.0)
     projected = [
-        TurbulentWind(mean, intensity=0.14, seed=s, time_step=1.0, harmonics=1).at(time)
-        for s in range(runs * batches)
+        TurbulentWind(mean, intensity=0.14, seed=s, time_step=1.0, harmonics=1).at(time) for s in range(runs)
     ]
-    return np.concatenate(fitted), np.array(projected)
+    return fitted, np.array(projected)
 
 
 def compare_ensembles(fitted, projected, tolerance):
@@ -349,13 +348,13 @@ def compare_ensembles(fitted, projected, tolerance):
 
 
 def test_a_full_field_fitted_by_a_plane_has_the_variances_and_spectra_of_the_signals():
-    fitted, projected = ensembles(10.0, across=11, runs=100, batches=1)
+    fitted, projected = ensembles(10.0, across=11, runs=100)
     compare_ensembles(fitted, projected, tolerance=0.12)
 
 
 def test_gusts_lower_the_shear_in_both():
     # v and kappa_v = G_v / v are correlated through the mean shear: about -kappa sigma_v / V.
-    for signals in ensembles(10.0, across=9, runs=300, batches=1):
+    for signals in ensembles(10.0, across=9, runs=300):
         v, kappa = signals[..., 0] - signals[..., 0].mean(), signals[..., 1] - signals[..., 1].mean()
         slope = (v * kappa).mean() / (v**2).mean()
         assert slope == pytest.approx(-0.14 / 10.0, rel=0.25)
@@ -364,13 +363,12 @@ def test_gusts_lower_the_shear_in_both():
 @pytest.mark.slow(reason="fits 500 full fields of ten minutes at each of three speeds")
 @pytest.mark.parametrize("mean", [6.0, 10.0, 18.0])
 def test_a_fine_full_field_confirms_the_signals_closely(mean):
-    fitted, projected = ensembles(mean, across=23, runs=50, batches=10)
+    fitted, projected = ensembles(mean, across=23, runs=500)
     compare_ensembles(fitted, projected, tolerance=0.06)
 
 
-@pytest.mark.slow(reason="fits 300 full fields of ten minutes")
 def test_the_ten_minute_variance_scatters_like_that_of_a_full_field():
-    fitted, projected = ensembles(10.0, across=13, runs=100, batches=3)
+    fitted, projected = ensembles(10.0, across=13, runs=300)
     field, disc = (s.var(axis=1).std(axis=0) / s.var(axis=1).mean(axis=0) for s in (fitted, projected))
     assert field[1:] == pytest.approx(disc[1:], rel=0.2)  # shears: the same
     assert 0.6 < field[0] / disc[0] < 1.0  # v: more, since no point of the disc has a fixed amplitude
