@@ -5,11 +5,12 @@ Moments are about the blade-root and tower-base axes as OpenFAST's RootMyb/RootM
 
 from __future__ import annotations
 
-from fatigue_runner.layout import T2B1I1CG
+from fatigue_runner.layout import MOST_HARMONICS, T2B1I1CG, harmonic_channels
 from fatigue_runner.layout import Channel as Channel
 
 STATES = T2B1I1CG.states
 WIND_SIGNALS = T2B1I1CG.wind
+WIND_HARMONICS = harmonic_channels(MOST_HARMONICS)  # what a wind of more than one harmonic has beside them
 
 LOADS = (
     Channel("tower_base_fore_aft_moment", "N.m", "tower-base fore-aft moment", "kN·m", 1e-3),
@@ -45,4 +46,14 @@ FATIGUE_CHANNELS = (
     "tower_base_side_side_moment",
 )
 
-BY_NAME = {c.name: c for c in (*STATES, *WIND_SIGNALS, *LOADS)}
+BY_NAME = {c.name: c for c in (*STATES, *WIND_SIGNALS, *WIND_HARMONICS, *LOADS)}
+
+
+def wind_channels(columns: int) -> tuple[Channel, ...]:
+    """The signals of a wind (n, columns), columns = 3 + 2 M: speed and shears, then the harmonics' pairs c_1, s_1, c_2, ..."""
+    return (*WIND_SIGNALS, *WIND_HARMONICS)[:columns]
+
+
+def wind_names(columns: int) -> tuple[str, ...]:
+    """Their names."""
+    return tuple(c.name for c in wind_channels(columns))

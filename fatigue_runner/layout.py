@@ -210,6 +210,7 @@ WIND = (
 )
 
 TRIPLE = 3  # azimuthal harmonics that the kernels fold at once
+MOST_HARMONICS = 16  # of any wind; six hold 98 % of every load range (docs/decisions/0011)
 
 
 def harmonic_channels(harmonics: int) -> tuple[Channel, ...]:

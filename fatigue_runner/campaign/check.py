@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fatigue_runner import channels
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.campaign.spec import Pitch
@@ -11,9 +12,10 @@ from fatigue_runner.errors import InputError
 def check(resolved: Resolved) -> list[str]:
     """Sentences that a person should read before the run.
 
-    Raises InputError, with the line, for a step above the stability limit, a corrector that does not fit, and a method that cannot
-    take the campaign's pitch.
+    Raises InputError, with the line, for a step above the stability limit, a corrector that does not fit, a method that cannot
+    take the campaign's pitch, and a channel to log that not every wind has.
     """
+    _check_logged_channels(resolved)
     for integration in resolved.integrations:
         try:
             _check(integration, resolved)
@@ -21,6 +23,19 @@ def check(resolved: Resolved) -> list[str]:
             where = resolved.source.where((*integration.path, *refused.key))
             raise InputError(f"{where}: {refused}") from None
     return _unseen_winds(resolved)
+
+
+def _check_logged_channels(resolved: Resolved) -> None:
+    """Harmonics beyond those of the winds: the spec knows the names, only the winds how many there are."""
+    there = min((wind.source.signals for wind in resolved.winds), default=0)
+    missing = {c.name for c in channels.WIND_HARMONICS} - set(channels.wind_names(there))
+    for index, name in enumerate(resolved.campaign.log.channels or ()):
+        if name in missing:
+            harmonics = min(wind.source.harmonics for wind in resolved.winds)
+            raise InputError(
+                f"{resolved.source.where(('log', 'channels', index))}: {name!r} cannot be logged, the wind has {harmonics} azimuthal "
+                f"harmonic{'s' * (harmonics != 1)}; remove it or give the wind more `harmonics`"
+            )
 
 
 class _Refused(Exception):

@@ -15,6 +15,7 @@ from fatigue_runner.trajectory import Trajectory
 # Status fields that every trajectory has, and those that only some runs know.
 STATUS_ARRAYS = ("accepted", "discrepancy", "threshold", "local_error")
 EXTRA_STATUS = ("reference_error", "clamped_lookups")
+WIND = (*channels.WIND_NAMES, *(c.name for c in channels.WIND_HARMONICS))
 
 
 def _table(values: np.ndarray, names: Sequence[str], what: str, rows: int) -> dict[str, np.ndarray]:
@@ -27,6 +28,15 @@ def _table(values: np.ndarray, names: Sequence[str], what: str, rows: int) -> di
             f"the {what} to log has shape {values.shape}; it must be ({rows}, {len(names)} or fewer)"
         )
     return dict(zip(names, values.T, strict=False))
+
+
+def _wind(values: np.ndarray, rows: int) -> dict[str, np.ndarray]:
+    """Columns of a (rows, 3 + 2 M) wind by name; a pair's sine is never without its cosine."""
+    count = np.shape(values)[-1] if np.ndim(values) == 2 else 0
+    found = _table(values, WIND, "wind", rows)
+    if count > len(channels.WIND_NAMES) and (count - len(channels.WIND_NAMES)) % 2:
+        raise LogError(f"the wind to log has {count} columns; it must be 3 + 2 M for M azimuthal harmonics")
+    return found
 
 
 def _status(
@@ -77,7 +87,7 @@ def columns(
         "status": _status(block, extra or {}, rows, first_row),
         "state": _table(block.state, channels.STATE_NAMES, "state", rows),
         "loads": loads,
-        "wind": _table(block.wind, channels.WIND_NAMES, "wind", rows),
+        "wind": _wind(block.wind, rows),
     }
     return {key: {"time": time, **fields} for key, fields in found.items() if fields}
 

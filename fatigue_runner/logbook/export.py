@@ -32,7 +32,7 @@ def table(log: Log) -> Columns:
         columns |= dict(zip(channels.STATE_NAMES, log.state.T, strict=True))
     columns |= log.loads
     if len(log.wind):
-        columns |= dict(zip(channels.WIND_NAMES, log.wind.T, strict=True))
+        columns |= dict(zip(channels.wind_names(log.wind.shape[1]), log.wind.T, strict=True))
     for f in STATUS_FIELDS[1:]:
         values = getattr(log, "clamped_lookups_at" if f.name == "clamped_lookups" else f.name)
         if values.size:

@@ -29,9 +29,9 @@ class Log(Trajectory):
     """A trajectory that was read from a log, with what the log says about it.
 
     Topics that the log does not hold are empty arrays; states and wind signals that it does not hold are
-    NaN. reference_error (n-1,), clamped_lookups_at (n-1,) counts per interval: empty where the log does not
-    hold them. run, result, units: metadata; complete: the whole run is there; lost: what was damaged, empty
-    for a whole file.
+    NaN; wind (n, 3 + 2 M) goes up to the highest azimuthal harmonic that it holds. reference_error (n-1,),
+    clamped_lookups_at (n-1,) counts per interval: empty where the log does not hold them. run, result, units:
+    metadata; complete: the whole run is there; lost: what was damaged, empty for a whole file.
     """
 
     reference_error: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -161,7 +161,7 @@ def assemble(tables: Tables, rows: int, intervals: int, contents: Contents) -> L
     time = clock["time"] if "time" in clock else clock["_log_time"] / 1e9
     loads = tables.get("loads", {})
     status = tables.get("status", {})
-    log = Log(time[:rows], matrix("state", channels.STATE_NAMES), matrix("wind", channels.WIND_NAMES))
+    log = Log(time[:rows], matrix("state", channels.STATE_NAMES), matrix("wind", _wind_names(tables)))
     log.loads = {k: v[:rows] for k, v in loads.items() if k != "time" and not k.startswith("_")}
     for name in STATUS_ARRAYS:
         if name in status:
@@ -171,6 +171,13 @@ def assemble(tables: Tables, rows: int, intervals: int, contents: Contents) -> L
     log.clamped_lookups_at = status.get(clamped, log.clamped_lookups_at)[:intervals]
     _take_metadata(log, contents)
     return log
+
+
+def _wind_names(tables: Tables) -> tuple[str, ...]:
+    """The signals up to the highest harmonic that the log holds."""
+    held = tables.get("wind", {})
+    pairs = [place // 2 + 1 for place, c in enumerate(channels.WIND_HARMONICS) if c.name in held]
+    return channels.wind_names(len(channels.WIND_NAMES) + 2 * max(pairs, default=0))
 
 
 def _take_metadata(log: Log, contents: Contents) -> None:

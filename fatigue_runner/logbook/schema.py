@@ -1,8 +1,9 @@
 """What a log holds: topics, flat named fields with fixed numbers, and the protobuf schemas from them.
 
 Numbers are for ever: `time` is 1, a channel is its position in `channels` plus 2, so channels are only ever
-added at the end of their list. A schema names the fields that the log holds and no others, since a proto3
-reader shows a declared but absent double as 0.0, which nobody could tell from a measurement.
+added at the end of their list; the wind's azimuthal harmonics, of which a log has as many as its wind, count
+from 101 on. A schema names the fields that the log holds and no others, since a proto3 reader shows a declared
+but absent double as 0.0, which nobody could tell from a measurement.
 """
 
 from __future__ import annotations
@@ -93,12 +94,18 @@ STATUS_FIELDS = (
     Field("clamped_lookups", 7, "fixed32"),
 )
 
+# c_1, s_1, c_2, ...: beyond the numbers that further signals of the whole rotor may get
+FIRST_HARMONIC = 101
+_HARMONICS = tuple(
+    Field(c.name, FIRST_HARMONIC + i, "double", c.unit) for i, c in enumerate(channels.WIND_HARMONICS)
+)
+
 # In the order of a row: the status of the interval that ends at a time comes before the state at that time.
 TOPICS: dict[str, Topic] = {
     "status": Topic("status", "/solver/status", "Status", 3, STATUS_FIELDS),
     "state": Topic("state", "/turbine/state", "State", 1, _fields(channels.STATES)),
     "loads": Topic("loads", "/turbine/loads", "Loads", 2, _fields(channels.LOADS)),
-    "wind": Topic("wind", "/wind", "Wind", 4, _fields(channels.WIND_SIGNALS)),
+    "wind": Topic("wind", "/wind", "Wind", 4, (*_fields(channels.WIND_SIGNALS), *_HARMONICS)),
 }
 BY_TOPIC = {t.name: t for t in TOPICS.values()}
 BY_SCHEMA = {t.schema_name: t for t in TOPICS.values()}

@@ -20,6 +20,7 @@ from typing import Any, Self
 import numpy as np
 from mcap.records import Attachment, Channel, Schema
 
+from fatigue_runner.channels import WIND_NAMES
 from fatigue_runner.logbook.columns import columns, topics_of
 from fatigue_runner.logbook.compression import compressor
 from fatigue_runner.logbook.container import Container, as_entries, as_text, library_name
@@ -228,7 +229,9 @@ class LogWriter:
         if self._file.closed:
             return
         if self._layout is None:
-            self._begin(layout_for(select_topics(self._topic_keys)))
+            # no row tells how many harmonics the wind has
+            topics = select_topics(self._topic_keys)
+            self._begin(layout_for(tuple(t.only(WIND_NAMES) if t.key == "wind" else t for t in topics)))
         with self._writing():
             self._close_chunk()
             self._container.metadata("result", self._full_result())

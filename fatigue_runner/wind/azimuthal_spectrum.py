@@ -30,6 +30,7 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.layout import MOST_HARMONICS
 from fatigue_runner.wind.radial_weight import RadialWeight
 
 Coherence = Callable[[np.ndarray], np.ndarray]
@@ -38,7 +39,6 @@ Coherence = Callable[[np.ndarray], np.ndarray]
 PANELS, NODES = 16, 20
 LENS_NODES = 64  # across half a lens; kinks of g between its knots leave an error of 2e-6 in H
 # Beyond, the quadrature grows coarse for slow eddies. Ten harmonics keep 99.7 % of every fatigue load.
-MOST_HARMONICS = 16
 # The least number that keeps 98 % of the damage-equivalent loads of a full field, 6 to 24 m/s: tests/wind measures it.
 DEFAULT_HARMONICS = 6
 # The table's range of a: smooth power laws on both sides of it.

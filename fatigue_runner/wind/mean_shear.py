@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.layout import WIND
+from fatigue_runner.layout import MOST_HARMONICS, WIND
 from fatigue_runner.rotor import Rotor
-from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS, MOST_HARMONICS
+from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.profiles import PowerLaw, Profile, profile_amplitudes, profile_disc_fit
 from fatigue_runner.wind.radial_weight import RadialWeight
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.layout import MOST_HARMONICS
 from fatigue_runner.wind import rotor_modes
 from fatigue_runner.wind.azimuthal_spectrum import (
     LARGEST_DECAY,
     LEAST_DECAY,
-    MOST_HARMONICS,
     admittances,
     pair_weights,
 )

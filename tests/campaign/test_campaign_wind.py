@@ -1,0 +1,64 @@
+"""Campaigns in winds with azimuthal harmonics, on the real turbine: logs that hold them are evaluated to the same bits."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from fatigue_runner.campaign import run_campaign
+from fatigue_runner.campaign.plan import make_plan
+from fatigue_runner.errors import InputError
+from fatigue_runner.logbook import read_log
+from fatigue_runner.turbine import load_turbine
+from fatigue_runner.wind import TurbulentWind
+
+TURBULENT = {
+    "name": "harmonics",
+    "duration": 6,
+    "workers": 1,
+    "wind": {"type": "turbulent", "speeds": [8, 11], "intensity": 0.14, "harmonics": 6},
+    "integrators": [{"method": "rk4", "step": 0.05}],
+    "reference": {"method": "rk7", "step": 0.02},
+    "fatigue": {"wohler_exponents": [4]},
+}
+AGAIN = TURBULENT | {"discard": 1, "fatigue": {"wohler_exponents": [4, 10]}}
+
+
+@pytest.fixture(autouse=True)
+def no_report(monkeypatch):
+    monkeypatch.setattr("fatigue_runner.report.write_report", lambda folder: folder / "report.html")
+
+
+def figures(results) -> list[dict]:
+    return [{name: value for name, value in row.items() if name != "wall_time"} for row in results]
+
+
+def test_logs_with_harmonics_are_evaluated_again_to_the_bits_of_a_fresh_run(tmp_path, monkeypatch):
+    run_campaign(TURBULENT, tmp_path / "resumed")
+    fresh = run_campaign(AGAIN, tmp_path / "fresh")
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            "fatigue_runner.campaign.block.simulate", lambda *_: pytest.fail("the logs hold it all")
+        )
+        resumed = run_campaign(AGAIN, tmp_path / "resumed")
+    assert resumed.simulated == 4 and figures(resumed) == figures(fresh)
+    wind = TurbulentWind(8.0, 0.14, seed=1, duration=6.0).on(load_turbine("nrel5mw").rotor)
+    for case_id in fresh.column("case_id"):
+        ours, theirs = (read_log(tmp_path / run / "logs" / f"{case_id}.mcap") for run in ("resumed", "fresh"))
+        assert ours.wind.shape == (301, 15) and ours.wind.tobytes() == theirs.wind.tobytes()
+        assert ours.state.tobytes() == theirs.state.tobytes()
+    (first,) = fresh.where(method="rk4", wind_speed=8.0)
+    log = read_log(tmp_path / "fresh" / "logs" / f"{first['case_id']}.mcap")
+    assert np.array_equal(log.wind, wind.at(log.time))
+
+
+def test_a_channel_that_the_wind_does_not_have_is_refused_with_its_line_before_anything_runs(tmp_path):
+    file = tmp_path / "campaign.yaml"
+    file.write_text(json.dumps(TURBULENT | {"log": {"channels": ["wind_speed", "wind_cos_7"]}}, indent=1))
+    with pytest.raises(
+        InputError, match=r"yaml:\d+: 'wind_cos_7' cannot be logged, the wind has 6 azimuthal"
+    ):
+        make_plan(file)
+    make_plan(TURBULENT | {"log": {"channels": ["wind_cos_6"]}})
