@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 
 def integrator_id(method: str, step: float, corrector: str = "", mode: str = "") -> str:
     """`heun_10ms`, `rk7_0.1ms`, `heun_10ms_hybrid_heun-10ms`; step [s], corrector: its name."""
@@ -48,3 +50,18 @@ def speed_id(speed: float) -> str:
 def value_id(value: float) -> str:
     """`0.14`, `0.123457`: two digits where these say all."""
     return f"{value:.2f}" if round(value, 2) == value else f"{value:.6g}"
+
+
+LONGEST = (
+    80  # bytes of a file's name in an id; a file system takes 255, and an integrator and an ending follow
+)
+
+
+def file_id(stem: str) -> str:
+    """What a file's name (without its ending) is in an id: other signs than letters, digits, `.` and `-` become `-`; a name of more
+    than LONGEST bytes is cut, and eight hex digits of all of it keep it apart from others that begin alike."""
+    found = "".join(c if c.isalnum() or c in ".-" else "-" for c in stem)
+    if len(found.encode()) <= LONGEST:
+        return found
+    digest = hashlib.sha256(stem.encode()).hexdigest()[:8]
+    return f"{found.encode()[: LONGEST - 9].decode(errors='ignore')}-{digest}"

@@ -44,3 +44,9 @@ def test_a_series_is_the_method_and_the_family_at_any_step():
     assert naming.integrator_series("heun") == "heun"
     assert naming.integrator_series("heun", "mlp", "hybrid") == "heun + network, hybrid"
     assert naming.integrator_series("heun", "affine", "enhanced") == "heun + affine, enhanced"
+
+
+def test_a_long_file_name_is_cut_in_an_id_and_stays_apart_from_others_that_begin_alike():
+    assert naming.file_id("a b_c.1") == "a-b-c.1"
+    first, second = (naming.file_id("\u00e9" * 200 + end) for end in "xy")
+    assert first != second and first[:30] == second[:30] and len(first.encode()) <= naming.LONGEST

@@ -36,16 +36,30 @@ def number(
     raise InputError(f"{what} must be {wanted}, got {value!r}{f'; {hint}' if hint else ''}")
 
 
+def decimal(text: str) -> float | None:
+    """The number that a text of a file is, NaN and infinities too; None for anything else: `1_0.3` is a damaged number, not 10.3."""
+    try:
+        return None if "_" in text else float(text)
+    except ValueError:
+        return None
+
+
 def wind_speed(what: str, value: Any) -> float:
     """A wind speed [m/s] that the aerodynamics can take: finite and positive."""
     return number(what, value, above=0.0, unit=" m/s", hint="the aerodynamics need wind from the front")
 
 
+def linear_shear(what: str, value: Any) -> float:
+    """A linear shear kappa [-] with which no edge of the rotor has wind from behind."""
+    hint = "beyond 1 the wind blows backwards at the rotor's edge"
+    return number(what, value, at_least=-1.0, at_most=1.0, hint=hint)
+
+
 def signal_table(what: str, values: Any) -> np.ndarray:
     """Samples as a read-only (n, n_signals) array; (n,) stands for wind speeds without shear.
 
-    Raises InputError, with the sample's index, for a NaN and for a speed that is not positive, and for a
-    wrong shape.
+    Raises InputError, with the sample's index, for a NaN, for a speed that is not positive and a shear beyond 1, and
+    for a wrong shape.
     """
     columns = ", ".join(WIND_NAMES)
     try:
@@ -62,6 +76,9 @@ def signal_table(what: str, values: Any) -> np.ndarray:
     for row in np.flatnonzero(table[:, 0] <= 0.0)[:1]:
         bad = f"wind_speed of sample {row} is {table[row, 0]:g} m/s"
         raise InputError(f"{what}: {bad}; the aerodynamics need positive wind speeds")
+    for row, column in np.argwhere(np.abs(table[:, 1:]) > 1.0)[:1]:
+        bad = f"{WIND_NAMES[1 + column]} of sample {row} is {table[row, 1 + column]:g}"
+        raise InputError(f"{what}: {bad}; a linear shear beyond 1 blows backwards at the rotor's edge")
     table.flags.writeable = False
     return table
 

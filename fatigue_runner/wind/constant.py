@@ -14,7 +14,7 @@ from fatigue_runner.inputs.section import problem
 from fatigue_runner.inputs.sweep import Sweep, expand
 from fatigue_runner.naming import joined, speed_id, value_id
 from fatigue_runner.rotor import Rotor
-from fatigue_runner.wind.checks import number, wind_speed
+from fatigue_runner.wind.checks import linear_shear, wind_speed
 from fatigue_runner.wind.mean_shear import NO_TURBINE, checked_order, mean_signals
 from fatigue_runner.wind.profiles import PowerLaw
 from fatigue_runner.wind.section import Realisation, Site, WindSection
@@ -50,8 +50,8 @@ class ConstantWind(WindSource):
     ) -> None:
         put = object.__setattr__
         put(self, "speed", wind_speed("constant wind: speed", speed))
-        put(self, "vertical_shear", number("constant wind: vertical_shear", vertical_shear))
-        put(self, "horizontal_shear", number("constant wind: horizontal_shear", horizontal_shear))
+        put(self, "vertical_shear", linear_shear("constant wind: vertical_shear", vertical_shear))
+        put(self, "horizontal_shear", linear_shear("constant wind: horizontal_shear", horizontal_shear))
         put(self, "shear_exponent", shear_exponent)
         put(self, "rotor", rotor)
         put(self, "order", checked_order("constant wind", harmonics, shear_exponent, self.vertical_shear))

@@ -16,11 +16,16 @@ from fatigue_runner.channels import WIND_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.source import Place
 from fatigue_runner.inputs.sweep import as_list, check_not_empty
+from fatigue_runner.naming import file_id
+from fatigue_runner.wind.checks import decimal
+from fatigue_runner.wind.fields.formats import SUFFIXES
 from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.series import SeriesWind
 from fatigue_runner.wind.source import SOURCES
 
 COLUMNS = ("time", *WIND_NAMES)
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
+AS_FIELD = "give it as `type: full-field`"
 
 
 def read_wind_file(path: str | Path) -> SeriesWind:
@@ -36,7 +41,11 @@ def read_wind_file(path: str | Path) -> SeriesWind:
             rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
     except FileNotFoundError:
         raise InputError(f"{path}: no such wind file; check the path") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except UnicodeDecodeError:
+        raise InputError(
+            f"{path}: this is binary or no UTF-8, but a csv file is text; if it is a wind field (.bts, .wnd, .hh, a Mann box), {AS_FIELD}"
+        ) from None
+    except (OSError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as a csv file in UTF-8 ({error})") from None
     if not rows:
         raise InputError(f"{path}:1: the file is empty; its first line must be {','.join(COLUMNS)}")
@@ -44,7 +53,8 @@ def read_wind_file(path: str | Path) -> SeriesWind:
     samples = np.array([_sample(path, line, row, order) for line, row in rows[1:]])
     if len(samples) < 2:
         raise InputError(f"{path}: {len(samples)} samples after the header; a series needs at least two")
-    time_step = _time_step(path, [line for line, _ in rows[1:]], samples[:, 0])
+    digits = max(_decimals(row[order[0]]) for _, row in rows[1:])
+    time_step = _time_step(path, [line for line, _ in rows[1:]], samples[:, 0], 0.5 * 10.0**-digits)
     try:
         return SeriesWind(time_step, samples[:, 1:], origin=path.stem)
     except InputError as error:
@@ -54,6 +64,11 @@ def read_wind_file(path: str | Path) -> SeriesWind:
 def _header(path: Path, line: int, row: list[str]) -> list[int]:
     """Where each of COLUMNS stands in a row."""
     names = [field.strip() for field in row]
+    for sign, word in SEPARATORS.items():
+        if len(names) == 1 and sign in names[0]:
+            raise InputError(
+                f"{path}:{line}: the columns are separated by {word}; separate them by commas and write decimal points"
+            )
     for name in names:
         if name not in COLUMNS:
             raise InputError(
@@ -78,22 +93,33 @@ def _sample(path: Path, line: int, row: list[str], order: list[int]) -> list[flo
         )
     sample = []
     for name, position in zip(COLUMNS, order, strict=True):
-        try:
-            value = float(row[position])
-        except ValueError:
-            raise InputError(f"{path}:{line}: {name} is {row[position].strip()!r}; give a number") from None
+        value = decimal(row[position])
+        if value is None:
+            raise InputError(f"{path}:{line}: {name} is {row[position].strip()!r}; give a number")
         if not math.isfinite(value):
             raise InputError(f"{path}:{line}: {name} is {value}; fill or cut the gap")
         if name == "wind_speed" and value <= 0:
             raise InputError(
                 f"{path}:{line}: wind_speed is {value:g} m/s; the aerodynamics need positive wind speeds"
             )
+        if name.endswith("shear") and abs(value) > 1:
+            raise InputError(
+                f"{path}:{line}: {name} is {value:g}; a linear shear beyond 1 blows backwards at the rotor's edge (an angle in degrees?)"
+            )
         sample.append(value)
     return sample
 
 
-def _time_step(path: Path, lines: list[int], time: np.ndarray) -> float:
-    """The uniform step [s] of a column of times that starts at 0."""
+def _decimals(text: str) -> int:
+    """Digits behind the point of a number as it is written; 12, as good as exact, where it has an exponent."""
+    return 12 if "e" in text.lower() else len(text.strip().partition(".")[2])
+
+
+def _time_step(path: Path, lines: list[int], time: np.ndarray, rounding: float) -> float:
+    """The uniform step [s] of a column of times that starts at 0 and is written to within `rounding` [s].
+
+    Where every time can be a multiple of one step, it is the shortest such number: 0.00625 of 0.0063, 0.0125, 0.0188, ...
+    """
     if time[0] != 0.0:
         raise InputError(
             f"{path}:{lines[0]}: the first time is {time[0]:g} s; it must be 0, where the run starts"
@@ -102,13 +128,18 @@ def _time_step(path: Path, lines: list[int], time: np.ndarray) -> float:
     for i in np.flatnonzero(steps <= 0)[:1]:
         order = f"time {time[i + 1]:g} s is not after {time[i]:g} s"
         raise InputError(f"{path}:{lines[i + 1]}: {order}; times must rise")
-    # Twelve digits: the step read from a long column of rounded times is the one that was meant.
-    step = float(f"{time[-1] / (len(time) - 1):.12g}")
+    count = np.arange(1, len(time))
+    slack = rounding * (1 + 1e-6)  # 0.00625 lies just half a digit from 0.0063
+    low, high = ((time[1:] - slack) / count).max(), ((time[1:] + slack) / count).min()
+    if low <= high:
+        # twelve digits hold any step that was meant
+        candidates = (float(f"{(low + high) / 2:.{digits}g}") for digits in range(1, 13))
+        return next((step for step in candidates if low <= step <= high), (low + high) / 2)
     usual = float(np.median(steps))
     for i in np.flatnonzero(np.abs(steps - usual) > 1e-3 * usual)[:1]:
         change = f"the time step changes here to {steps[i]:g} s (elsewhere {usual:g} s)"
         raise InputError(f"{path}:{lines[i + 1]}: {change}; resample the series at a uniform step")
-    return step
+    return float(f"{time[-1] / (len(time) - 1):.12g}")
 
 
 SOURCES["file"] = read_wind_file
@@ -134,9 +165,15 @@ class FileSection(WindSection):
                     f"{site.place.where('files', index)}: wind file {name!r} cannot be read ({error.strerror}); "
                     "paths start at the campaign file"
                 ) from None
-            stem = "".join(c if c.isalnum() or c in ".-" else "-" for c in path.stem)
+            if path.suffix.lower() in SUFFIXES:
+                what = f"{name!r} is a wind field (TurbSim, Bladed, HAWC2, mostly binary), no csv file"
+                raise InputError(f"{site.place.where('files', index)}: {what}; {AS_FIELD}")
             yield Realisation(
-                stem, self.kind, (("path", str(path)),), ("files", index), contents=(("path", digest),)
+                file_id(path.stem),
+                self.kind,
+                (("path", str(path)),),
+                ("files", index),
+                contents=(("path", digest),),
             )
 
     def resolved(self, place: Place) -> dict[str, Any]:

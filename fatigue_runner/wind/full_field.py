@@ -16,6 +16,7 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.source import Place
 from fatigue_runner.inputs.sweep import as_list, check_not_empty
 from fatigue_runner.layout import WIND
+from fatigue_runner.naming import file_id
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.checks import refuse_standstill
@@ -182,9 +183,8 @@ class FullFieldSection(WindSection):
                     f"{site.place.where('files', index)}: wind file {name!r} cannot be read ({error.strerror}); "
                     "paths start at the campaign file"
                 ) from None
-            stem = "".join(c if c.isalnum() or c in ".-" else "-" for c in path.stem)
             yield Realisation(
-                stem, self.kind, (("path", str(path)), ("harmonics", self.harmonics)), ("files", index),
+                file_id(path.stem), self.kind, (("path", str(path)), ("harmonics", self.harmonics)), ("files", index),
                 contents=(("path", content),),
             )  # fmt: skip
 

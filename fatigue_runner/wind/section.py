@@ -47,9 +47,10 @@ class Realisation:
     mean_speed: float | None = None
     contents: tuple[tuple[str, str], ...] = ()
 
-    def build(self, rotor: Rotor) -> WindSource:
-        """The wind source as it blows on this rotor; raises InputError for parameters that it refuses."""
-        return make_wind(self.kind, **dict(self.parameters)).on(rotor)
+    def build(self, rotor: Rotor | None = None) -> WindSource:
+        """The wind source as it blows on this rotor, or on none yet; raises InputError for parameters that it refuses."""
+        wind = make_wind(self.kind, **dict(self.parameters))
+        return wind if rotor is None else wind.on(rotor)
 
     @property
     def identity(self) -> list[Any]:

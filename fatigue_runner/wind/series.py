@@ -38,7 +38,7 @@ class SeriesWind(WindSource):
         object.__setattr__(self, "values", signal_table("series wind", self.values))
         if len(self.values) < 2:
             raise InputError("series wind has one sample; give at least two, or use constant wind")
-        way_out = "raise the samples there or sample more finely"
+        way_out = "the spline through a jump overshoots it: raise the samples there, or spread the jump over several samples"
         refuse_standstill(self.name, self.time_step, self._coefficients, way_out)
 
     @classmethod

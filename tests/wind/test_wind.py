@@ -141,7 +141,9 @@ def test_constant_wind_refuses_a_speed_that_is_not_positive(speed):
 
 
 def test_constant_wind_refuses_a_shear_that_is_not_finite():
-    with pytest.raises(InputError, match="vertical_shear must be a finite number"):
+    with pytest.raises(
+        InputError, match="vertical_shear must be a number at least -1 and at most 1, got nan"
+    ):
         ConstantWind(8.0, float("nan"))
 
 
@@ -199,7 +201,7 @@ def test_wrong_steps_are_refused_with_their_place(times, values, message):
 
 def test_a_series_passes_through_its_samples_and_reproduces_a_cubic():
     def cubic(t):
-        return np.stack([8 + 0.1 * t - 0.02 * t**2 + 0.001 * t**3, 0.1 + 0 * t, 0.01 * t**3], axis=1)
+        return np.stack([8 + 0.1 * t - 0.02 * t**2 + 0.001 * t**3, 0.1 + 0 * t, 0.005 * t**3], axis=1)
 
     source = SeriesWind(0.5, cubic(np.arange(12) * 0.5))
     fine = np.linspace(0, 5.5, 111)
@@ -247,7 +249,9 @@ def test_the_minimum_of_cubics_is_exact(cubics, h):
 
 
 def test_a_spline_that_swings_below_zero_between_its_samples_is_refused():
-    with pytest.raises(InputError, match=r"falls to -\d\.\d\d m/s at 2\.\d s.*sample more finely"):
+    with pytest.raises(
+        InputError, match=r"falls to -\d\.\d\d m/s at 2\.\d s.*spread the jump over several samples"
+    ):
         SeriesWind(1.0, [9.0, 9.0, 0.1, 0.1, 9.0, 9.0])
 
 
@@ -284,7 +288,7 @@ def written(tmp_path, text, name="gust.csv", **options):
 
 
 def test_a_file_gives_its_samples_back(tmp_path):
-    rows = [(0.1 * i, 8 + 0.3 * np.sin(i), 0.14, 0.01 * i) for i in range(300)]
+    rows = [(0.1 * i, 8 + 0.3 * np.sin(i), 0.14, 0.001 * i) for i in range(300)]
     text = HEADER + "".join(",".join(f"{x:.10g}" for x in row) + "\n" for row in rows)
     source = read_wind_file(written(tmp_path, text))
     assert source.time_step == 0.1
@@ -321,6 +325,20 @@ def test_the_same_samples_make_the_same_wind_as_the_file(tmp_path):
         (HEADER + "0,8,0,0\n\n1,nan,0,0\n", r"gust\.csv:4: wind_speed is nan"),
         (HEADER + "0,8,0,0\n1,-2,0,0\n", r"gust\.csv:3: wind_speed is -2 m/s"),
         (HEADER + "0,8,0,0\n1,8,0\n", r"gust\.csv:3: 3 fields, the header has 4"),
+        (
+            "time;wind_speed\n0;8\n",
+            r"gust\.csv:1: the columns are separated by semicolons; separate them by commas",
+        ),
+        ("time\twind_speed\n0\t8\n", r"gust\.csv:1: the columns are separated by tabs"),
+        (HEADER + "0,8,0,0\n1,1_0.3,0,0\n", r"gust\.csv:3: wind_speed is '1_0\.3'; give a number"),
+        (
+            HEADER + "0,8,0,0\n1,8,0,270\n",
+            r"gust\.csv:3: horizontal_shear is 270; a linear shear beyond 1 blows",
+        ),
+        (
+            HEADER + "0,8,0,0\n0.0063,8,0,0\n0.0126,8,0,0\n0.0193,8,0,0\n",
+            r"gust\.csv:5: the time step changes here to 0\.0067 s",
+        ),
         (HEADER + "0;8;0;0\n", r"gust\.csv:2: 1 fields.*separate them by commas"),
         (HEADER + "5,8,0,0\n6,8,0,0\n", r"gust\.csv:2: the first time is 5 s; it must be 0"),
         (HEADER + "0,8,0,0\n2,8,0,0\n1,8,0,0\n", r"gust\.csv:4: time 1 s is not after 2 s"),
@@ -332,11 +350,23 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path, text, message):
         read_wind_file(written(tmp_path, text))
 
 
+@pytest.mark.parametrize(("step", "digits"), [(0.00625, 4), (1 / 3, 2), (0.05, 2), (1 / 60, 4), (0.1, 12)])
+def test_times_that_were_rounded_when_they_were_written_are_those_of_a_uniform_step(tmp_path, step, digits):
+    rows = "".join(f"{step * i:.{digits}f},8,0,0\n" for i in range(1000))
+    found = read_wind_file(written(tmp_path, HEADER + rows)).time_step
+    # a thousand rounded times know their step to a thousandth of the rounding
+    assert found == pytest.approx(step, abs=1e-3 * 10.0**-digits)
+    if step in (0.00625, 0.05, 0.1):
+        assert found == step
+
+
 def test_a_missing_or_binary_file_is_refused_by_name(tmp_path):
     with pytest.raises(InputError, match=r"nowhere\.csv: no such wind file"):
         read_wind_file(tmp_path / "nowhere.csv")
     (tmp_path / "field.bts").write_bytes(bytes([7, 0, 255, 254]))
-    with pytest.raises(InputError, match=r"field\.bts: cannot be read as a csv file"):
+    with pytest.raises(
+        InputError, match=r"field\.bts: this is binary.*a wind field.*give it as `type: full-field`"
+    ):
         read_wind_file(tmp_path / "field.bts")
     with pytest.raises(InputError, match="cannot be read"):
         read_wind_file(tmp_path)

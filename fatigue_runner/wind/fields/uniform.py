@@ -23,7 +23,7 @@ import numpy as np
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.wind.azimuth import checked_harmonics, radial_shares
-from fatigue_runner.wind.checks import number
+from fatigue_runner.wind.checks import decimal, number
 from fatigue_runner.wind.fields.files import read_text
 from fatigue_runner.wind.fields.projection import FieldHarmonics
 from fatigue_runner.wind.profiles import PowerLaw, profile_amplitudes, profile_disc_fit, refuse_ground
@@ -142,10 +142,9 @@ def _rows(path: Path) -> tuple[list[int], list[list[float]]]:
 
 
 def _number(path: Path, line: int, name: str, word: str) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        raise InputError(f"{path}:{line}: the {name} is {word!r}; give a number") from None
+    value = decimal(word)
+    if value is None:
+        raise InputError(f"{path}:{line}: the {name} is {word!r}; give a number")
     if not np.isfinite(value):
         raise InputError(f"{path}:{line}: the {name} is {word}; fill or cut the gap")
     return value
