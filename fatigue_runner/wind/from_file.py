@@ -25,6 +25,7 @@ from fatigue_runner.wind.source import SOURCES
 
 COLUMNS = ("time", *WIND_NAMES)
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
+COARSEST = 0.05  # rounding of times over their step beyond which any series could be uniform
 AS_FIELD = "give it as `type: full-field`"
 
 
@@ -128,14 +129,14 @@ def _time_step(path: Path, lines: list[int], time: np.ndarray, rounding: float) 
     for i in np.flatnonzero(steps <= 0)[:1]:
         order = f"time {time[i + 1]:g} s is not after {time[i]:g} s"
         raise InputError(f"{path}:{lines[i + 1]}: {order}; times must rise")
+    usual = float(np.median(steps))
     count = np.arange(1, len(time))
     slack = rounding * (1 + 1e-6)  # 0.00625 lies just half a digit from 0.0063
     low, high = ((time[1:] - slack) / count).max(), ((time[1:] + slack) / count).min()
-    if low <= high:
+    if low <= high and rounding <= COARSEST * usual:
         # twelve digits hold any step that was meant
         candidates = (float(f"{(low + high) / 2:.{digits}g}") for digits in range(1, 13))
         return next((step for step in candidates if low <= step <= high), (low + high) / 2)
-    usual = float(np.median(steps))
     for i in np.flatnonzero(np.abs(steps - usual) > 1e-3 * usual)[:1]:
         change = f"the time step changes here to {steps[i]:g} s (elsewhere {usual:g} s)"
         raise InputError(f"{path}:{lines[i + 1]}: {change}; resample the series at a uniform step")
