@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fatigue_runner.campaign import run_campaign
-from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.fatigue import damage_equivalent_load, rainflow
 from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
@@ -49,7 +48,7 @@ def simulate(
     """Simulate one case and return its trajectory.
 
     turbine: of `load_turbine`, or a name for it; wind: a wind source, or a constant speed [m/s]; step,
-    duration [s]; initial: "operating-point", "paper", "paper-spinning" or a state (16,); output_step [s]:
+    duration [s]; initial: "operating-point", "paper", "paper-spinning" or a state; output_step [s]:
     None samples every step, else the solution is interpolated; pitch [rad]: a number, or a PitchSeries for a
     pitch that varies in time. A case that diverges ends early: see `diverged_at`. corrector: a name of
     `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid", which guards it. Raises InputError
@@ -87,9 +86,7 @@ def _state(turbine: Any, initial: Any, wind: WindSource, pitch: float) -> np.nda
         if initial not in INITIAL_STATES:
             raise InputError(f"unknown initial state {initial!r}{did_you_mean(initial, INITIAL_STATES)}")
         return initial_state(turbine, initial, wind, pitch)
-    state = np.asarray(initial, dtype=np.float64)
-    if state.shape != (len(STATE_NAMES),) or not np.isfinite(state).all():
-        raise InputError(
-            f"initial must be a state of {len(STATE_NAMES)} finite numbers, got shape {state.shape}"
-        )
+    state, size = np.asarray(initial, dtype=np.float64), turbine.layout.size
+    if state.shape != (size,) or not np.isfinite(state).all():
+        raise InputError(f"initial must be a state of {size} finite numbers, got shape {state.shape}")
     return state

@@ -6,12 +6,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fatigue_runner.layout import T2B1I1CG, Channel
+
 
 @dataclass
 class Trajectory:
     """One case, sampled at the output times.
 
-    time (n,) [s]; state (n, 16) in the order of `channels.STATES`; wind (n, 3) in the order of `channels.WIND_SIGNALS`;
+    time (n,) [s]; state (n, k) in the order of `states`, which are `channels.STATES` and the first-order states of a controller, say,
+    behind them; wind (n, 3) in the order of `channels.WIND_SIGNALS`;
     loads {channel: (n,)} SI. The status arrays have one entry per output interval, (n-1,): `accepted` is False where any
     step in the interval fell back, `discrepancy` and `threshold` are the hybrid's norms (NaN where there is no test),
     `local_error` the embedded error estimate's largest scaled component (NaN for methods without one).
@@ -31,6 +34,7 @@ class Trajectory:
     clamped_lookups: int = 0
     wall_time: float = 0.0
     diverged_at: float | None = None
+    states: tuple[Channel, ...] = T2B1I1CG.states
 
     @property
     def duration(self) -> float:

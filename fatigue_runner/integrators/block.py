@@ -199,4 +199,5 @@ def _trajectory(
         clamped_lookups=int(group.clamped[lane]),
         wall_time=group.wall / lanes,
         diverged_at=diverged_at if diverged_at >= 0 else None,
+        states=block.data.model.layout.states,
     )

@@ -77,10 +77,11 @@ class Integrator:
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """Cases of one turbine that share duration and output: n winds, each with its state (16,) at t = 0.
+    """Cases of one turbine that share duration and output: n winds, each with its state at t = 0.
 
-    initial (n, 16); duration, output_step [s] (None: output at every step); pitch [rad]: a number or a PitchSeries, the same for
-    all. Winds need not share a time grid: `simulate` groups them. A wind that depends on the turbine's size is made for this one.
+    initial (n, size of the turbine's layout); duration, output_step [s] (None: output at every step); pitch [rad]: a number or a
+    PitchSeries, the same for all. Winds need not share a time grid: `simulate` groups them. A wind that depends on the turbine's size
+    is made for this one.
     Raises InputError where the shapes do not fit.
     """
 

@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.channels import STATE_NAMES
-
 INITIAL_STATES = ("operating-point", "paper", "paper-spinning")
 
 
 def initial_state(turbine: Any, initial: str | Any, wind: Any, pitch: float = 0.0) -> np.ndarray:
-    """State (16,) at t = 0 in the order of `channels.STATES` for a wind source; pitch [rad].
+    """State (size,) at t = 0 in the order of the turbine's layout for a wind source; pitch [rad].
 
     `operating-point` is that of the wind's mean speed and shears. `paper` is the literal state of
     arXiv:2504.05493: all zero but a rotor azimuth of pi/3, which leaves the generator 60 degrees behind
     and winds the shaft up. `paper-spinning` is what was probably meant, since it fits the paper's
-    figure: the rotor turns at pi/3 rad/s, the generator with it. A sequence is the state itself.
+    figure: the rotor turns at pi/3 rad/s, the generator with it; states of first order begin at zero in both. A sequence is the
+    state itself.
     Raises InputError where the turbine has no operating point at this wind.
     """
     if not isinstance(initial, str):
@@ -27,11 +26,12 @@ def initial_state(turbine: Any, initial: str | Any, wind: Any, pitch: float = 0.
         label = wind.label
         shears = label.get("vertical_shear") or 0.0, label.get("horizontal_shear") or 0.0
         return np.asarray(turbine.operating_point(wind.mean_speed, *shears, pitch=pitch), dtype=np.float64)
-    state = np.zeros(len(STATE_NAMES))
-    state[STATE_NAMES.index("rotor_azimuth")] = math.pi / 3
+    layout = turbine.layout
+    state = np.zeros(layout.size)
+    state[layout.rotor] = math.pi / 3
     if initial == "paper-spinning":
         generator = turbine.parameters["g_ratio"] * math.pi / 3
-        state[STATE_NAMES.index("generator_azimuth")] = generator
-        state[STATE_NAMES.index("rotor_speed")] = math.pi / 3
-        state[STATE_NAMES.index("generator_speed")] = generator
+        state[layout.generator] = generator
+        state[layout.rotor_speed] = math.pi / 3
+        state[layout.generator_speed] = generator
     return state

@@ -47,6 +47,11 @@ class Model:
         digest = hashlib.sha256(source + repr(self.layout).encode()).hexdigest()
         return f"{self.name}-{digest[:16]}"
 
+    @property
+    def looks_up_pitch(self) -> bool:
+        """Whether its tables go over the pitch, too: it is a signal, or made of the states, and not one number for a whole run."""
+        return bool(self.generated.RHS_CODE.second)
+
 
 _KNOWN: dict[str, Model] = {}
 

@@ -34,55 +34,64 @@ class Equations(Protocol):
 AZIMUTHS = 24  # of one revolution; three blades and up to the second harmonic repeat well within them
 
 
-# rows of T2B1i1cG by what they are here
-_FREEDOMS, _SIZE = T2B1I1CG.freedoms, T2B1I1CG.size
+# rows of T2B1i1cG by what they are here; first-order states follow them where a turbine has any
+_FREEDOMS = T2B1I1CG.freedoms
 _FLAP = T2B1I1CG.blade_sets[0]
 _FLAPS, _FLAP_RATES = slice(_FLAP, _FLAP + 3), slice(_FREEDOMS + _FLAP, _FREEDOMS + _FLAP + 3)
 _EDGE = T2B1I1CG.row("edge")
 _ROTOR, _GENERATOR = T2B1I1CG.rotor, T2B1I1CG.generator
 _SPEED, _GENERATOR_SPEED = T2B1I1CG.rotor_speed, T2B1I1CG.generator_speed
+_UNKNOWNS = 8  # of a steady rotation, before the first-order states
 
 
-def _states(unknown: Array, azimuths: Array, ratio: float) -> Array:
-    """(16, n) from (fore-aft, side-side, flap, its cosine and sine over the azimuth, edge, shaft twist, rotor speed)."""
-    a, s, f, fc, fs, e, twist, speed = unknown
-    x = np.zeros((_SIZE, len(azimuths)))
+def _states(layout: Layout, unknown: Array, azimuths: Array, ratio: float) -> Array:
+    """(size, n) from (fore-aft, side-side, flap, its cosine and sine over the azimuth, edge, shaft twist, rotor speed) and the
+    first-order states."""
+    a, s, f, fc, fs, e, twist, speed = unknown[:_UNKNOWNS]
+    x = np.zeros((layout.size, len(azimuths)))
     psi = azimuths + np.arange(3)[:, None] * 2 * np.pi / 3
     x[0], x[1], x[_EDGE] = a, s, e
     x[_FLAPS] = f + fc * np.cos(psi) + fs * np.sin(psi)
     x[_FLAP_RATES] = speed * (fs * np.cos(psi) - fc * np.sin(psi))
     x[_ROTOR], x[_GENERATOR] = azimuths, ratio * (azimuths - twist)
     x[_SPEED], x[_GENERATOR_SPEED] = speed, ratio * speed
+    x[layout.first_order_rows] = unknown[_UNKNOWNS:, None]
     return x
 
 
 def _steady(
     turbine: Equations, wind: float, vertical_shear: float, horizontal_shear: float, pitch: float
 ) -> Array:
-    """The unknowns of `_states` that balance the mean of every equation, and the once-per-revolution part of the flap's."""
+    """The unknowns of `_states` that balance the mean of every equation, and the once-per-revolution part of the flap's.
+
+    First-order states are constant over the revolution, their slopes zero in the mean.
+    """
     from scipy.optimize import root
 
     if not wind > 0:
         raise InputError(f"operating point: the wind speed must be positive, got {wind} m/s")
-    p = turbine.parameters
+    p, layout = turbine.parameters, turbine.layout
     ratio, azimuths = p["g_ratio"], np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
     psi = azimuths + np.arange(3)[:, None] * 2 * np.pi / 3
-    scale = np.array([0.1, 0.01, 1.0, 0.1, 0.1, 0.1, 1e-3, 1.0])
+    own = np.array([1e4 * s.nudge for s in layout.first_order])
+    scale = np.array([0.1, 0.01, 1.0, 0.1, 0.1, 0.1, 1e-3, 1.0, *own])
 
     def residual(z: Array) -> Array:
         unknown = z * scale
-        x = _states(unknown, azimuths, ratio)
+        x = _states(layout, unknown, azimuths, ratio)
         acc = turbine.rhs(x, wind, vertical_shear, horizontal_shear, pitch)[_FREEDOMS:]
         swing = x[_FLAPS] - unknown[2]
         flap = (acc[_FLAPS] + unknown[7] ** 2 * swing) / 50
         mean = acc.mean(axis=1)
         harmonics = (flap * np.cos(psi)).mean(), (flap * np.sin(psi)).mean()
         drive = mean[_ROTOR], mean[_GENERATOR] / ratio
-        return np.array([mean[0], mean[1], flap.mean(), *harmonics, mean[_EDGE] / 50, *drive])
+        more = mean[_FREEDOMS:] / own
+        return np.array([mean[0], mean[1], flap.mean(), *harmonics, mean[_EDGE] / 50, *drive, *more])
 
     # from the fastest rotation down, so that the point right of the power maximum is found, not the stalled one
     for tip_speed_ratio in (7.5, 9.0, 6.0, 5.0, 10.5, 4.0, 3.0, 12.0):
-        start = np.array([1.0, -0.5, wind * 0.35, 0.0, 0.0, 0.1, 2.0, tip_speed_ratio * wind / p["radius"]])
+        speed = tip_speed_ratio * wind / p["radius"]
+        start = np.array([1.0, -0.5, wind * 0.35, 0.0, 0.0, 0.1, 2.0, speed, *np.zeros(len(own))])
         found = root(residual, start, tol=1e-11)
         if found.success and np.abs(found.fun).max() < 1e-6 and found.x[7] > 0.02:
             return found.x * scale
@@ -102,7 +111,7 @@ def operating_point(
 ) -> Array:
     """See Turbine.operating_point."""
     unknown = _steady(turbine, wind, vertical_shear, horizontal_shear, pitch)
-    return _states(unknown, np.array([azimuth]), turbine.parameters["g_ratio"])[:, 0]
+    return _states(turbine.layout, unknown, np.array([azimuth]), turbine.parameters["g_ratio"])[:, 0]
 
 
 def _multiblade(azimuth: float, speed: float) -> tuple[Array, Array, Array]:
@@ -120,23 +129,27 @@ def _multiblade(azimuth: float, speed: float) -> tuple[Array, Array, Array]:
 
 
 def linearised(turbine: Equations, wind: float, pitch: float = 0.0) -> Array:
-    """(16, 16) state matrix about the operating point in multiblade coordinates, averaged over the azimuth."""
+    """(size, size) state matrix about the operating point in multiblade coordinates, averaged over the azimuth."""
     unknown = _steady(turbine, wind, 0.0, 0.0, pitch)
     ratio, speed = turbine.parameters["g_ratio"], unknown[7]
-    total, q, rates = np.zeros((_SIZE, _SIZE)), slice(0, _FREEDOMS), slice(_FREEDOMS, _SIZE)
-    delta = np.array(T2B1I1CG.nudges)
+    layout = turbine.layout
+    size, q, rates, more = layout.size, layout.positions, layout.velocities, layout.first_order_rows
+    total, delta = np.zeros((size, size)), np.array(layout.nudges)
     for azimuth in np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
-        x = _states(unknown, np.array([azimuth]), ratio)[:, 0]
+        x = _states(layout, unknown, np.array([azimuth]), ratio)[:, 0]
         shifts = np.concatenate([np.diag(delta), -np.diag(delta)], axis=1)
-        acc = turbine.rhs(x[:, None] + shifts, wind, pitch=pitch)[rates]
-        jacobian = (acc[:, :_SIZE] - acc[:, _SIZE:]) / (2 * delta)
-        k, d = jacobian[:, q], jacobian[:, rates]
+        slopes = turbine.rhs(x[:, None] + shifts, wind, pitch=pitch)[_FREEDOMS:]
+        jacobian = (slopes[:, :size] - slopes[:, size:]) / (2 * delta)
+        acc, own = jacobian[:_FREEDOMS], jacobian[_FREEDOMS:]
         t, t1, t2 = _multiblade(azimuth, speed)
         inverse = np.linalg.inv(t)
-        block = np.zeros((_SIZE, _SIZE))
+        block = np.zeros((size, size))
         block[q, rates] = np.eye(_FREEDOMS)
-        block[rates, q] = inverse @ (k @ t + d @ t1 - t2)
-        block[rates, rates] = inverse @ (d @ t - 2 * t1)
+        block[rates, q] = inverse @ (acc[:, q] @ t + acc[:, rates] @ t1 - t2)
+        block[rates, rates] = inverse @ (acc[:, rates] @ t - 2 * t1)
+        block[rates, more] = inverse @ acc[:, more]
+        block[more, q] = own[:, q] @ t + own[:, rates] @ t1
+        block[more, rates], block[more, more] = own[:, rates] @ t, own[:, more]
         total += block / AZIMUTHS
     return total
 
@@ -155,7 +168,7 @@ def natural_frequencies(turbine: Equations, wind: float, pitch: float) -> list[t
     modes = []
     for value, vector in zip(values, vectors.T, strict=True):
         if value.imag > 2 * np.pi * 0.05:
-            share = (np.abs(vector[_FREEDOMS:]) * weight) ** 2
+            share = (np.abs(vector[_FREEDOMS : 2 * _FREEDOMS]) * weight) ** 2
             share[_ROTOR:_FREEDOMS] = share[_ROTOR:_FREEDOMS].sum() / 2
             modes.append((float(abs(value) / (2 * np.pi)), float(-value.real / abs(value)), share))
     modes.sort(key=lambda m: m[0])

@@ -13,31 +13,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.layout import T2B1I1CG, Layout, kernel_rows
+from fatigue_runner.layout import WIND, Layout, kernel_rows
 from fatigue_runner.rotor import SQUARE, Rotor
+from fatigue_runner.turbine.dynamics import UNCONTROLLED, Dynamics
 from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turbine_file
 from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine.lanes import KernelData
+    from fatigue_runner.turbine.model import Model
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Turbine:
-    """One turbine of the type T2B1i1cG. `parameters` by `equations.PARAMETERS` [SI], at zero pitch."""
+    """One turbine of the type T2B1i1cG. `parameters` by `equations.PARAMETERS` [SI], at zero pitch; dynamics: what moves it."""
 
     name: str
     parameters: Mapping[str, float]
     tables: AeroTables
     description: str = ""
+    dynamics: Dynamics = UNCONTROLLED
 
     @property
     def layout(self) -> Layout:
         """The states and signals of its equations."""
-        return T2B1I1CG
+        return self.dynamics.layout
 
     @property
     def hash(self) -> str:
@@ -46,11 +49,11 @@ class Turbine:
 
     def kernel_data(self, pitch: float = 0.0, harmonics: bool = False) -> KernelData:
         """Constants and table cells for the kernels; pitch [rad], positive to feather; harmonics: for winds with azimuthal ones."""
-        return _kernel_data(self, float(pitch), harmonics)
+        return _data_of(self, self.dynamics.model(False, harmonics), float(pitch))
 
     def pitched_kernel_data(self, harmonics: bool = False) -> KernelData:
         """The same for a pitch that varies in time. Raises InputError where the tables have too few pitches."""
-        return _pitched_kernel_data(self, harmonics)
+        return _data_of(self, self.dynamics.model(True, harmonics), 0.0)
 
     @property
     def pitch_range(self) -> tuple[float, float]:
@@ -89,9 +92,10 @@ class Turbine:
         horizontal_shear: ArrayLike = 0.0,
         pitch: ArrayLike = 0.0,
     ) -> Array:
-        """Time derivative of the state; (16,) or (16, n) -> the same shape.
+        """Time derivative of the state; (size,) or (size, n) -> the same shape.
 
-        wind [m/s], shears [-]: numbers or (n,); pitch [rad]: a number, or (n,), which takes the kernel for a varying pitch.
+        wind [m/s], shears [-]: numbers or (n,), other signals are zero; pitch [rad]: a number, or (n,), which takes the kernel for a
+        varying pitch.
         Raises InputError for another shape.
         """
         from fatigue_runner.turbine.lanes import evaluate
@@ -104,7 +108,8 @@ class Turbine:
         def signals(*values: ArrayLike) -> Array:
             return np.stack([np.broadcast_to(np.asarray(v, float), columns.shape[1]) for v in values])
 
-        p, angle = signals(wind, vertical_shear, horizontal_shear), np.asarray(pitch, float)
+        still = [0.0] * (len(self.layout.wind) - len(WIND))
+        p, angle = signals(wind, vertical_shear, horizontal_shear, *still), np.asarray(pitch, float)
         if angle.ndim:
             return evaluate(self.pitched_kernel_data(), columns, p, signals(angle))[0].reshape(x.shape)
         return evaluate(self.kernel_data(float(angle)), columns, p)[0].reshape(x.shape)
@@ -131,7 +136,7 @@ class Turbine:
         azimuth: float = 0.0,
         pitch: float = 0.0,
     ) -> Array:
-        """(16,) state of steady rotation: mean loads and the flap's swing over a revolution are balanced.
+        """(size,) state of steady rotation: mean loads and the flap's swing over a revolution are balanced.
 
         wind [m/s], shears [-], azimuth and pitch [rad].
         Raises InputError where the turbine has no steady rotation at this wind and pitch.
@@ -161,12 +166,17 @@ def _hash(turbine: Turbine) -> str:
     return digest.hexdigest()
 
 
-@lru_cache(maxsize=256)
-def _kernel_data(turbine: Turbine, pitch: float, harmonics: bool) -> KernelData:
-    from fatigue_runner.turbine.lanes import KernelData
-    from fatigue_runner.turbine.model import FIXED_PITCH, HARMONIC
+def _data_of(turbine: Turbine, model: Model, pitch: float) -> KernelData:
+    """What the kernels of `model` read; pitch [rad] where they are made for one."""
+    if model.looks_up_pitch:
+        return _data_for_every_pitch(turbine, model)
+    return _data_at_pitch(turbine, model, pitch)
 
-    model = HARMONIC if harmonics else FIXED_PITCH
+
+@lru_cache(maxsize=256)
+def _data_at_pitch(turbine: Turbine, model: Model, pitch: float) -> KernelData:
+    from fatigue_runner.turbine.lanes import KernelData
+
     kernel = model.generated
     return KernelData(
         model=model,
@@ -178,11 +188,9 @@ def _kernel_data(turbine: Turbine, pitch: float, harmonics: bool) -> KernelData:
 
 
 @lru_cache(maxsize=4)
-def _pitched_kernel_data(turbine: Turbine, harmonics: bool) -> KernelData:
+def _data_for_every_pitch(turbine: Turbine, model: Model) -> KernelData:
     from fatigue_runner.turbine.lanes import KernelData
-    from fatigue_runner.turbine.model import VARYING_PITCH, VARYING_PITCH_HARMONIC
 
-    model = VARYING_PITCH_HARMONIC if harmonics else VARYING_PITCH
     kernel = model.generated
     return KernelData(
         model=model,
