@@ -173,6 +173,10 @@ def _finish(
         "case_id": case.id,
         "case_hash": case.hash,
         "wind": wind.name,
+        "wind_description": wind.description,
+        "wind_strength": wind.strength,
+        "wind_left_out": wind.left_out,
+        "wind_notes": " ".join(wind.notes),
         "corrector_hash": case.integration.digest or "",
         **{name: "" if row[name] is None else str(row[name]) for name in DESCRIPTION},
     }

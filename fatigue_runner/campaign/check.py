@@ -22,7 +22,9 @@ def check(resolved: Resolved) -> list[str]:
         except _Refused as refused:
             where = resolved.source.where((*integration.path, *refused.key))
             raise InputError(f"{where}: {refused}") from None
-    return _unseen_winds(resolved)
+    # a wind file is told of once, however many cases it has
+    notes = dict.fromkeys(note for wind in resolved.winds for note in wind.notes)
+    return [*notes, *_unseen_winds(resolved)]
 
 
 def _check_logged_channels(resolved: Resolved) -> None:

@@ -88,6 +88,8 @@ def make_row(
     row = empty_row(case, campaign) | describe(case, wind, campaign) | _costs(trajectory)
     if trajectory.diverged_at is not None:
         return row
+    speed = own.trajectory.wind[:, 0]
+    row["rotor_intensity"] = np.std(speed) / np.mean(speed)
     row |= {f"del_{suffix}": own.loads[channel, m] for channel, m, suffix in _fatigue(campaign)}
     row |= {
         f"{name}_{channel}": function(series)
@@ -125,6 +127,7 @@ def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
     return {
         **{name: known(label.get(name)) for name in WIND},
         "wind_source": case.wind.kind,
+        "wind_file": case.wind.file,
         "pitch_deg": campaign.pitch if isinstance(campaign.pitch, float) else None,
         **_trained(case.integration),
     }

@@ -30,11 +30,12 @@ HIGHEST_WIND_SPEED = 40.0
 
 @dataclass(frozen=True, eq=False)
 class ResolvedWind:
-    """One wind of the campaign: what names it, what blows, and the state (16,) in which its cases start."""
+    """One wind of the campaign: what names it, what blows, the state (16,) in which its cases start, and what one should know of it."""
 
     named: Realisation
     source: WindSource
     initial: NDArray[np.float64]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +153,7 @@ def _winds(
         where = place.where(*named.path)
         blowing = _blowing(named, turbine.rotor, campaign.duration, where)
         try:
-            winds.append(ResolvedWind(named, blowing, starts.of(blowing)))
+            winds.append(ResolvedWind(named, blowing, starts.of(blowing), blowing.notes))
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
     return winds

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +17,7 @@ from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.export import export as export_log
 from fatigue_runner.logbook.reader import number
 from fatigue_runner.logbook.recovery import recover as recover_log
-from fatigue_runner.logbook.summary import LogSummary, summarise
+from fatigue_runner.logbook.summary import Extreme, LogSummary, summarise
 from fatigue_runner.terminal import command_group
 
 app = command_group("Look into the logs of a run: what ran, whether the file is whole, repair it, export it.")
@@ -27,13 +27,14 @@ LogPath = Annotated[Path, typer.Argument(help="A log (.mcap).", show_default=Fal
 _SHOWN_STRETCHES = 8
 _SHOWN_PROBLEMS = 4  # of a file, by `check`
 _WIDTH = 130
+_HARMONICS = frozenset(channel.name for channel in channels.WIND_HARMONICS)
 
 
 @app.command()
 def info(
     log: LogPath,
     everything: Annotated[
-        bool, typer.Option("--all", help="Print every entry of the result as it is.")
+        bool, typer.Option("--all", help="Print every entry of the result as it is, and every extreme.")
     ] = False,
 ) -> None:
     """Print what ran, with what, how often the corrector was accepted, where not, and the extremes.
@@ -57,7 +58,7 @@ def info(
     if summary.equivalent_loads and not everything:
         console.print(_equivalent_loads_table(summary))
     if summary.extremes:
-        console.print(_extremes_table(summary))
+        _print_extremes(console, summary, everything)
 
 
 def _print_head(console: Console, summary: LogSummary, everything: bool) -> None:
@@ -88,8 +89,8 @@ def _print_head(console: Console, summary: LogSummary, everything: bool) -> None
 
 # Entries of `run` that the sentence of `what_ran` tells; the case's name does not, as a person copies it from there.
 _TOLD = (
-    "method", "step", "corrector", "mode", "turbine", "wind", "wind_source", "wind_speed", "turbulence_intensity", "seed",
-    "is_reference",
+    "method", "step", "corrector", "mode", "turbine", "wind", "wind_source", "wind_speed", "turbulence_intensity", "harmonics",
+    "seed", "is_reference",
 )  # fmt: skip
 
 
@@ -106,7 +107,11 @@ def what_ran(run: Mapping[str, str]) -> str:
     words += f", on {run.get('turbine', '?')} in {run.get('wind_source', '')} wind".replace("  ", " ")
     speed, intensity = number(run, "wind_speed"), number(run, "turbulence_intensity")
     words += f" of {speed:g} m/s" if speed is not None else ""
-    words += f", intensity {intensity:g}" if intensity else ""
+    # a series' own intensity is not a point's; where it is, the log tells what the rotor keeps of it
+    where = " at a point" if run.get("wind_strength") else ""
+    words += f", intensity {intensity:g}{where}" if intensity else ""
+    harmonics = number(run, "harmonics")
+    words += f", {harmonics:g} azimuthal harmonics" if harmonics is not None and harmonics > 1 else ""
     return words + (f", seed {run['seed']}" if run.get("seed") else "")
 
 
@@ -176,11 +181,20 @@ def _print_acceptance(console: Console, summary: LogSummary) -> None:
         console.print(f"  and {more} shorter stretches")
 
 
-def _extremes_table(summary: LogSummary) -> Table:
+def _print_extremes(console: Console, summary: LogSummary, everything: bool) -> None:
+    """Of every channel; the wind's harmonics, a dozen and more that say little alone, only where all is asked for."""
+    shown = [e for e in summary.extremes if everything or e.name not in _HARMONICS]
+    console.print(_extremes_table(shown))
+    left = len(summary.extremes) - len(shown)
+    if left:
+        console.print(f"and {left} amplitudes of the wind's azimuthal harmonics: `--all` shows them")
+
+
+def _extremes_table(extremes: Sequence[Extreme]) -> Table:
     table = _table("extremes", "channel", "unit")
     for heading in ("min", "at s", "mean", "max", "at s"):
         table.add_column(heading, justify="right")
-    for e in summary.extremes:
+    for e in extremes:
         known = channels.BY_NAME.get(e.name)
         unit, scale = (known.read_unit, known.scale) if known else (e.unit, 1.0)
         values = f"{e.minimum * scale:.5g}", f"{e.mean * scale:.5g}", f"{e.maximum * scale:.5g}"

@@ -89,7 +89,15 @@ class ConstantWind(WindSource):
             "horizontal_shear": float(self._signals[2]),
         }
         law = {} if self.shear_exponent is None else {"shear_exponent": self.shear_exponent}
-        return {**shears, **law, "harmonics": self.harmonics}
+        return {**shears, **law}
+
+    @property
+    def description(self) -> str:
+        return "steady wind, linear shears" if self.shear_exponent is None else "steady wind, power law"
+
+    @property
+    def left_out(self) -> str:
+        return "" if self.shear_exponent is None else super().left_out
 
     @property
     def cell_key(self) -> None:

@@ -24,6 +24,7 @@ from fatigue_runner.wind.fields import FieldHarmonics, UniformWind, WindField, h
 from fatigue_runner.wind.mean_shear import NO_TURBINE, checked_harmonics, radial_rule
 from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.source import WindSource
+from fatigue_runner.wind.words import told_strength
 
 
 @dataclass(frozen=True, init=False)
@@ -85,10 +86,20 @@ class FullFieldWind(WindSource):
         return {
             "vertical_shear": float(signals[:, 1].mean()),
             "horizontal_shear": float(signals[:, 2].mean()),
-            "turbulence_intensity": float(signals[:, 0].std() / signals[:, 0].mean()),
-            "file": Path(self.path).name,
-            "harmonics": self.order,
+            "turbulence_intensity": self._projected.hub_intensity,
+            "wind_file": Path(self.path).name,
         }
+
+    @property
+    def description(self) -> str:
+        return "the longitudinal wind of a full-field file, carried past the rotor as it is (Taylor's hypothesis)"
+
+    @property
+    def strength(self) -> str:
+        variances = self._signals.var(axis=0)
+        rotor, blade = variances[0], variances[0] + variances[len(WIND) :].sum() / 2
+        point = self._projected.hub_intensity * self.mean_speed
+        return told_strength(self.mean_speed, point, float(rotor**0.5), float(blade**0.5), self.order)
 
     @property
     def cell_key(self) -> float:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 from pydantic_core import PydanticCustomError
@@ -51,6 +52,12 @@ class Realisation:
         """The wind source as it blows on this rotor, or on none yet; raises InputError for parameters that it refuses."""
         wind = make_wind(self.kind, **dict(self.parameters))
         return wind if rotor is None else wind.on(rotor)
+
+    @property
+    def file(self) -> str | None:
+        """Name of the file that it is read from; None for a wind from none."""
+        parameters = dict(self.parameters)
+        return next((Path(parameters[name]).name for name, _ in self.contents), None)
 
     @property
     def identity(self) -> list[Any]:

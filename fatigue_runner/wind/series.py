@@ -68,6 +68,10 @@ class SeriesWind(WindSource):
         }
 
     @property
+    def description(self) -> str:
+        return "a series of the rotor's wind speed and linear shears"
+
+    @property
     def cell_key(self) -> float:
         return self.time_step
 

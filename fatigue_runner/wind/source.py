@@ -38,6 +38,7 @@ from fatigue_runner.layout import TRIPLE, WIND, harmonic_channels, kernel_rows
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.cells import ROUNDING, cell_count, evaluate, minimum
 from fatigue_runner.wind.checks import number
+from fatigue_runner.wind.words import told_left_out
 
 # kind -> what makes a source of its parameters; filled as the modules of this folder are imported.
 SOURCES: dict[str, Callable[..., WindSource]] = {}
@@ -103,6 +104,21 @@ class WindSource(ABC):
         return ()
 
     @property
+    def description(self) -> str:
+        """What blows, in words that hold for every seed and speed."""
+        return f"{self.kind} wind"
+
+    @property
+    def strength(self) -> str:
+        """What a point, the rotor's mean and a blade have of its turbulence, in words; empty for a wind without any."""
+        return ""
+
+    @property
+    def left_out(self) -> str:
+        """What it lacks of a wind over a rotor, in words."""
+        return told_left_out(self.harmonics)
+
+    @property
     def length(self) -> float:
         """Time [s] for which the source says something; infinite where the last value holds on."""
         return math.inf
@@ -114,7 +130,12 @@ class WindSource(ABC):
     @property
     def label(self) -> dict[str, Any]:
         """The parameters that describe the source, for tables and logs; `wind_source` is its kind."""
-        return {"wind_source": self.kind, "wind_speed": self.mean_speed, **self.parameters}
+        return {
+            "wind_source": self.kind,
+            "wind_speed": self.mean_speed,
+            "harmonics": self.harmonics,
+            **self.parameters,
+        }
 
     def cells(self, duration: float) -> tuple[float, np.ndarray]:
         """(cell_duration [s], coefficients (n_cells, 4, n_signals)) for the time from 0 to `duration` [s].

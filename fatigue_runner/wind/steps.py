@@ -62,6 +62,10 @@ class StepWind(WindSource):
         }
 
     @property
+    def description(self) -> str:
+        return "steps of the rotor's wind speed and linear shears"
+
+    @property
     def cell_key(self) -> float | None:
         return self._cell_ticks / TICKS_PER_SECOND if self._cell_ticks else None
 

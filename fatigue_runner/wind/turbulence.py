@@ -48,6 +48,7 @@ from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.series import periodic_cubics
 from fatigue_runner.wind.source import WindSource
 from fatigue_runner.wind.streams import speed_stream, uniform
+from fatigue_runner.wind.words import told_strength
 
 # Order n of the azimuthal mode behind each signal, in the order of `channels.WIND_SIGNALS`. A signal's place
 # is its random stream, so signals added at the end leave the others' series as they are.
@@ -195,9 +196,7 @@ class TurbulentWind(WindSource):
     @cached_property
     def modal_series(self) -> np.ndarray:
         """Amplitudes a_0, a_z, a_y of the fluctuation at the samples, (n, 3) [m/s]; of zero mean."""
-        variances = modal_variances(
-            self.mean, self.rotor.radius, self.rotor.hub_height, self.samples, self.time_step, self.scaled
-        )
+        variances = self._modal_variances
         half = np.zeros((self.samples // 2 + 1, len(MODES)), complex)
         for place, variance in enumerate(variances):
             stream = (place, *self._stream)  # so that one seed is independent from speed to speed
@@ -214,15 +213,53 @@ class TurbulentWind(WindSource):
         thousandths = round(1000 * self.mean)
         return (thousandths,) if thousandths / 1000 == self.mean else speed_stream(self.mean)
 
-    @cached_property
-    def harmonic_series(self) -> np.ndarray:
-        """Amplitudes c_0, c_1, s_1, ... of the fluctuation at the samples, (n, 1 + 2 M) [m/s]; of zero mean."""
+    @property
+    def _turbulence(self) -> RotorTurbulence:
         rotor = self.rotor
-        turbulence = RotorTurbulence(
+        return RotorTurbulence(
             self.mean, rotor.radius, rotor.hub_height, RadialWeight(*rotor.weight), self.harmonics, self.samples,
             self.time_step, self.spectrum_name, self.scaled,
         )  # fmt: skip
-        return self.sigma * turbulence.series(self.seed, self.amplitudes == "random-phase")
+
+    @cached_property
+    def harmonic_series(self) -> np.ndarray:
+        """Amplitudes c_0, c_1, s_1, ... of the fluctuation at the samples, (n, 1 + 2 M) [m/s]; of zero mean."""
+        return self.sigma * self._turbulence.series(self.seed, self.amplitudes == "random-phase")
+
+    @property
+    def description(self) -> str:
+        spectra = {
+            "kaimal": "Kaimal spectrum and exponential",
+            "von-karman": "von Karman spectrum and isotropic",
+        }
+        model = (
+            ""
+            if self.intensity is not None
+            else f" of class {self.turbulence_class} (normal turbulence model)"
+        )
+        return f"IEC 61400-1 turbulence{model}, {spectra[self.spectrum_name]} coherence; mean wind: power law"
+
+    @property
+    def strength(self) -> str:
+        """Expected over all seeds; a series' own scatters, and holds nothing slower than twice its length."""
+        variances = self._expected
+        blade = self.sigma * math.sqrt(variances.sum()) if self.harmonics > 1 else None
+        rotor = self.sigma * math.sqrt(variances[0].sum())
+        return told_strength(self.mean, self.sigma, rotor, blade, self.harmonics)
+
+    @property
+    def _expected(self) -> np.ndarray:
+        """Variance over sigma_1^2 of the rotor's mean, of c_1 and of s_1, ... (1 + M or more, frequencies)."""
+        if self.harmonics > 1:
+            return self._turbulence.variances()
+        return self._modal_variances
+
+    @property
+    def _modal_variances(self) -> np.ndarray:
+        rotor = self.rotor
+        return modal_variances(
+            self.mean, rotor.radius, rotor.hub_height, self.samples, self.time_step, self.scaled
+        )
 
     def _harmonic_signals(self) -> np.ndarray:
         """(n, 3 + 2 M): gusts move the disc mean v and the harmonics; the mean shear stays what it is in m/s."""

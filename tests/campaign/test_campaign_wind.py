@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from field_files import some_field, write_bts
 
 from fatigue_runner.campaign import run_campaign
 from fatigue_runner.campaign.plan import make_plan
@@ -52,6 +53,39 @@ def test_logs_with_harmonics_are_evaluated_again_to_the_bits_of_a_fresh_run(tmp_
     (first,) = fresh.where(method="rk4", wind_speed=8.0)
     log = read_log(tmp_path / "fresh" / "logs" / f"{first['case_id']}.mcap")
     assert np.array_equal(log.wind, wind.at(log.time))
+
+
+def test_table_and_log_say_how_strong_the_wind_is_at_a_point_and_over_the_rotor(tmp_path):
+    results = run_campaign(
+        TURBULENT | {"wind": TURBULENT["wind"] | {"shear_exponent": 0.1}}, tmp_path / "out"
+    )
+    for row in results:
+        assert (row["turbulence_intensity"], row["harmonics"], row["shear_exponent"]) == (0.14, 6, 0.1)
+        log = read_log(tmp_path / "out" / "logs" / f"{row['case_id']}.mcap")
+        assert row["rotor_intensity"] == log.wind[:, 0].std() / log.wind[:, 0].mean() < 0.1
+        assert log.run["harmonics"] == "6" and float(log.result["rotor_intensity"]) == row["rotor_intensity"]
+        assert log.run["wind_description"].startswith("IEC 61400-1 turbulence, Kaimal spectrum")
+        assert "m/s (14.0\u00a0% of the mean) at a point" in log.run["wind_strength"]
+        assert log.run["wind_left_out"] == "lateral and vertical wind; azimuthal harmonics above 6"
+
+
+def test_a_wind_from_a_file_is_in_the_table_by_the_file_s_name_and_notes_are_told_once(tmp_path):
+    field = write_bts(
+        tmp_path / "coarse.bts",
+        some_field(300, 7, 7),
+        spacing=(25.0, 25.0),
+        mean=9.0,
+        hub=90.0,
+        time_step=0.1,
+    )
+    wind = {"type": "full-field", "files": [str(field)], "harmonics": 6}
+    campaign = TURBULENT | {"wind": wind, "reference": None}
+    (note,) = make_plan(campaign).notes
+    assert "coarse.bts: points every 25 m hold azimuthal harmonics up to 5 on this rotor" in note
+    (row,) = run_campaign(campaign, tmp_path / "out")
+    assert row["wind_file"] == "coarse.bts" and row["wind_source"] == "full-field" and row["seed"] is None
+    log = read_log(tmp_path / "out" / "logs" / f"{row['case_id']}.mcap")
+    assert log.run["wind_notes"] == note and log.run["wind_file"] == "coarse.bts"
 
 
 def test_a_channel_that_the_wind_does_not_have_is_refused_with_its_line_before_anything_runs(tmp_path):

@@ -11,6 +11,7 @@ import pytest
 from logbook_example import RUN, differing, example, same_bits
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+from typer.testing import CliRunner
 
 from fatigue_runner import channels
 from fatigue_runner.layout import MOST_HARMONICS
@@ -25,6 +26,7 @@ from fatigue_runner.logbook import (
     summarise,
     write_log,
 )
+from fatigue_runner.logbook.commands import app
 from fatigue_runner.logbook.schema import TOPICS, fields_in
 from fatigue_runner.trajectory import Trajectory
 
@@ -138,3 +140,18 @@ def test_the_names_of_a_wind_s_columns_are_those_of_the_layout():
     assert channels.wind_names(3) == channels.WIND_NAMES
     assert channels.wind_names(7)[3:] == ("wind_cos_1", "wind_sin_1", "wind_cos_2", "wind_sin_2")
     assert set(channels.wind_names(3 + 2 * MOST_HARMONICS)) <= set(channels.BY_NAME)
+
+
+def test_info_says_how_strong_the_wind_is_where_and_shows_its_amplitudes_when_all_is_asked_for(tmp_path):
+    run = RUN | {
+        "step": "0.1", "turbine": "nrel5mw", "wind_source": "turbulent", "turbulence_intensity": "0.14", "harmonics": "2",
+        "wind_strength": "standard deviation 1.12 m/s at a point; the mean over the rotor keeps 0.62 m/s",
+        "wind_left_out": "lateral and vertical wind; azimuthal harmonics above 2",
+    }  # fmt: skip
+    path = write_log(tmp_path / "a.mcap", with_harmonics(2), run)
+    text = CliRunner().invoke(app, ["info", str(path)]).output
+    assert "of 8.25 m/s, intensity 0.14 at a point, 2 azimuthal harmonics" in text
+    assert run["wind_strength"] in text and run["wind_left_out"] in text
+    assert "wind_speed" in text and "wind_cos_2" not in text and "and 4 amplitudes" in text
+    text = CliRunner().invoke(app, ["info", "--all", str(path)]).output
+    assert "wind_cos_2" in text and "and 4 amplitudes" not in text

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from field_files import some_field, write_bts
@@ -127,3 +129,31 @@ def test_a_full_field_blows_as_its_projection_says(turbine, tmp_path):
     assert run.diverged_at is None and run.wind.std(axis=0)[3:].min() > 0
     with pytest.raises(InputError, match="cannot be read"):
         FullFieldWind(tmp_path / "gone.bts").on(turbine.rotor).at([0.0])
+
+
+def test_what_is_said_of_a_turbulence_s_strength_is_what_its_series_have(turbine):
+    """Expected over seeds: the mean over the rotor, and a blade that turns through all azimuths."""
+    winds = [TurbulentWind(8.0, 0.14, seed=s, harmonics=4).on(turbine.rotor) for s in range(24)]
+    series = np.stack([wind.harmonic_series for wind in winds])
+    rotor, point = series[..., 0].std(), winds[0].sigma
+    blade = np.sqrt(series[..., 0].var() + (series[..., 1:].var(axis=(0, 1))).sum() / 2)
+    told = [float(x) for x in re.findall(r"([\d.]+) m/s \(", winds[0].strength)]
+    assert told[0] == round(point, 2) == 1.12
+    assert told[1:] == [pytest.approx(rotor, rel=0.1), pytest.approx(blade, rel=0.05)]
+    assert rotor < 0.7 * point and rotor < blade < point
+    assert "azimuthal harmonics above 4" in winds[0].left_out
+    assert "a turning blade" not in TurbulentWind(8.0, 0.14, harmonics=1).strength
+    assert "beyond linear shears" in TurbulentWind(8.0, 0.14, harmonics=1).left_out
+
+
+def test_a_full_field_says_how_strong_its_hub_point_is_and_not_its_mean_over_the_rotor(turbine, tmp_path):
+    field = some_field(600, 15, 15)
+    path = write_bts(tmp_path / "a.bts", field, spacing=(10.0, 10.0), mean=9.0, hub=90.0, time_step=0.1)
+    wind = FullFieldWind(path, harmonics=3).on(turbine.rotor)
+    point = 9.0 * wind.label["turbulence_intensity"]
+    told = [float(x) for x in re.findall(r"([\d.]+) m/s \(", wind.strength)]
+    assert told[0] == pytest.approx(point, abs=0.006)
+    assert (
+        told[1] == pytest.approx(wind.at(np.arange(500) * 0.1)[:, 0].std(), rel=0.05)
+        and told[1] < 0.6 * point
+    )

@@ -82,6 +82,15 @@ class WindField:
         mean = self.u.mean(axis=0, dtype=float)
         return np.array([np.interp(0.0, self.y, mean[:, k]) for k in range(len(self.z))])
 
+    def intensity_at(self, height: float) -> float:
+        """Standard deviation over mean of the wind at the grid's middle at that height [m], linear between points."""
+        k = int(np.clip(np.searchsorted(self.z, height) - 1, 0, len(self.z) - 2))
+        j = int(np.clip(np.searchsorted(self.y, 0.0) - 1, 0, len(self.y) - 2))
+        b, c = -self.y[j] / (self.y[j + 1] - self.y[j]), (height - self.z[k]) / (self.z[k + 1] - self.z[k])
+        rows = self.u[:, j, k : k + 2] * (1 - b) + self.u[:, j + 1, k : k + 2] * b
+        series = (rows[:, 0] * (1 - c) + rows[:, 1] * c).astype(float)
+        return float(series.std() / series.mean())
+
     @property
     def length(self) -> float:
         """Time [s] that the field lasts: from the first to the last sample, or one period."""

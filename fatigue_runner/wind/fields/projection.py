@@ -49,6 +49,7 @@ class FieldHarmonics:
     start: float = 0.0
     periodic: bool = False
     notes: tuple[str, ...] = field(default=())
+    hub_intensity: float = math.nan
 
     @property
     def end(self) -> float:
@@ -123,6 +124,7 @@ def harmonics_of(
         start=start,
         periodic=wind_field.periodic,
         notes=wind_field.notes + _coarse(wind_field, radii, weight, harmonics),
+        hub_intensity=wind_field.intensity_at(hub_height),
     )
 
 
