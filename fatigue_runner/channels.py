@@ -9,6 +9,9 @@ from fatigue_runner.layout import MOST_HARMONICS, T2B1I1CG, harmonic_channels
 from fatigue_runner.layout import Channel as Channel
 
 STATES = T2B1I1CG.states
+GROWING = tuple(
+    c.name for c in STATES[T2B1I1CG.rotor : T2B1I1CG.freedoms]
+)  # azimuths, which have no extremes
 WIND_SIGNALS = T2B1I1CG.wind
 WIND_HARMONICS = harmonic_channels(MOST_HARMONICS)  # what a wind of more than one harmonic has beside them
 

@@ -17,6 +17,7 @@ import numpy as np
 from fatigue_runner import integrators
 from fatigue_runner import turbine as turbines
 from fatigue_runner.channels import LOAD_NAMES, STATE_NAMES
+from fatigue_runner.layout import T2B1I1CG
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.trajectory import Trajectory
 
@@ -44,6 +45,7 @@ def build_world(monkeypatch: Any) -> World:
         hash="0" * 64,
         parameters={"g_ratio": 97.0},
         rotor=Rotor(63.0, 90.0),
+        layout=T2B1I1CG,
         kernel_data=lambda pitch: None,
         operating_point=lambda speed, *shears, pitch: np.full(len(STATE_NAMES), 0.1 * speed),
     )

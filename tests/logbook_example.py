@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,18 @@ def example(rows: int = 400, seed: int = 0) -> Trajectory:
         clamped_lookups=3,
         wall_time=0.0123,
     )
+
+
+MORE = (
+    channels.Channel("filtered_speed", "rad/s", "generator speed through a low-pass", "rpm"),
+    channels.Channel("torque_demand", "N.m", "torque demand", "kN·m", 1e-3),
+)
+
+
+def with_states(run: Trajectory) -> Trajectory:
+    """The same with two states of first order behind the turbine's."""
+    more = np.random.default_rng(5).normal(size=(len(run.time), len(MORE)))
+    return replace(run, state=np.concatenate([run.state, more], axis=1), states=(*channels.STATES, *MORE))
 
 
 def arrays(t: Any) -> dict[str, np.ndarray]:

@@ -97,7 +97,9 @@ def make_row(
         for name, function in (("mean", np.mean), ("min", np.min), ("max", np.max))
     }
     if reference is not None and not case.integration.is_reference:
-        row |= _errors(own, reference, campaign)
+        errors = _errors(own, reference, campaign)
+        # states beyond the table's columns count in the worst and in the mean
+        row |= {name: value for name, value in errors.items() if name in row}
     return {name: known(row[name]) for name in row}
 
 

@@ -85,7 +85,7 @@ def columns(
         loads[name] = np.asarray(values, float)
     found = {
         "status": _status(block, extra or {}, rows, first_row),
-        "state": _table(block.state, channels.STATE_NAMES, "state", rows),
+        "state": _table(block.state, [c.name for c in block.states], "state", rows),
         "loads": loads,
         "wind": _wind(block.wind, rows),
     }
@@ -96,11 +96,13 @@ def topics_of(
     available: Mapping[str, Mapping[str, np.ndarray]],
     keys: Iterable[str] | None,
     names: Iterable[str] | None,
+    states: Sequence[channels.Channel] = channels.STATES,
 ) -> tuple[Topic, ...]:
     """The topics, in row order and with the fields that are available, that a log keeps.
 
     keys: topics asked for, None for what is there; names: channels asked for, None for all (status is not a
-    matter of channels). Raises LogError for a topic or channel that is asked for and not there.
+    matter of channels); states: of the run, those of the turbine first. Raises LogError for a topic or channel
+    that is asked for and not there.
     """
     kept = [t for t in select_topics(keys) if keys is not None or t.key in available]
     if names is not None:
@@ -119,7 +121,7 @@ def topics_of(
         if names is not None and t.key != "status":
             fields &= set(names)
         if fields - {"time"}:
-            found.append(t.only(fields))
+            found.append((t.of(states) if t.key == "state" else t).only(fields))
     if [t.key for t in found] == ["status"]:
         raise LogError(
             "cannot log the status alone: it has no row for the first time; add state, loads or wind"

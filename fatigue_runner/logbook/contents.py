@@ -61,6 +61,7 @@ class Contents:
         Raises LogError where a declaration was damaged.
         """
         found = {}
+        units = self.metadata.get("units") if self.ours else None
         for channel in self.channels.values():
             schema = self.schemas.get(channel.schema_id)
             if schema and channel.message_encoding == schema.encoding == "protobuf":
@@ -69,6 +70,11 @@ class Contents:
                 raise LogError(f"the declaration of topic {channel.topic!r} is damaged")
             else:
                 topic = None
+            if topic is not None and units:
+                # names that only the log knows: they stand in a record with a checksum, too
+                for name in BY_TOPIC[topic.name].further(topic.field_names):
+                    if name not in units:
+                        raise LogError(f"the schema of topic {topic.name!r} is damaged at field {name!r}")
             if topic is not None:
                 found[channel.id] = topic
         if len({t.key for t in found.values()}) < len(found):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import IO
@@ -29,7 +29,7 @@ def table(log: Log) -> Columns:
     """
     columns: Columns = {"time": log.time}
     if len(log.state):
-        columns |= dict(zip(channels.STATE_NAMES, log.state.T, strict=True))
+        columns |= dict(zip((c.name for c in log.states), log.state.T, strict=True))
     columns |= log.loads
     if len(log.wind):
         columns |= dict(zip(channels.wind_names(log.wind.shape[1]), log.wind.T, strict=True))
@@ -38,6 +38,12 @@ def table(log: Log) -> Columns:
         if values.size:
             columns[f.name] = np.concatenate([[np.nan], values])
     return columns
+
+
+def units_of(log: Log) -> dict[str, str]:
+    """SI units of the columns of `table`."""
+    status = {f.name: f.unit for f in STATUS_FIELDS}
+    return status | {n: c.unit for n, c in channels.BY_NAME.items()} | {c.name: c.unit for c in log.states}
 
 
 def choose(columns: Columns, patterns: Iterable[str] | None) -> Columns:
@@ -55,7 +61,7 @@ def choose(columns: Columns, patterns: Iterable[str] | None) -> Columns:
     return chosen
 
 
-def _write_csv(columns: Columns, stream: IO[bytes]) -> None:
+def _write_csv(columns: Columns, _units: Mapping[str, str], stream: IO[bytes]) -> None:
     """Shortest form that reads back as the same number; empty for NaN."""
     text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
     writer = csv.writer(text)
@@ -65,7 +71,7 @@ def _write_csv(columns: Columns, stream: IO[bytes]) -> None:
     text.detach()
 
 
-def _write_parquet(columns: Columns, stream: IO[bytes]) -> None:
+def _write_parquet(columns: Columns, units: Mapping[str, str], stream: IO[bytes]) -> None:
     try:
         import pyarrow
         import pyarrow.parquet
@@ -73,7 +79,6 @@ def _write_parquet(columns: Columns, stream: IO[bytes]) -> None:
         raise LogError(
             "parquet needs pyarrow: `pip install 'fatigue-runner[parquet]'`, or export to .csv"
         ) from None
-    units = {f.name: f.unit for f in STATUS_FIELDS} | {n: c.unit for n, c in channels.BY_NAME.items()}
     fields = [
         pyarrow.field(name, pyarrow.float64(), metadata={"unit": units.get(name, "")}) for name in columns
     ]
@@ -81,7 +86,10 @@ def _write_parquet(columns: Columns, stream: IO[bytes]) -> None:
     pyarrow.parquet.write_table(pyarrow.table(arrays, schema=pyarrow.schema(fields)), stream)
 
 
-FORMATS: dict[str, Callable[[Columns, IO[bytes]], None]] = {".csv": _write_csv, ".parquet": _write_parquet}
+FORMATS: dict[str, Callable[[Columns, Mapping[str, str], IO[bytes]], None]] = {
+    ".csv": _write_csv,
+    ".parquet": _write_parquet,
+}
 
 
 def export(
@@ -97,7 +105,8 @@ def export(
     suffix = out.suffix.lower()
     if suffix not in FORMATS:
         raise LogError(f"cannot export to {out}: the name must end in {' or '.join(FORMATS)}")
-    columns = choose(table(read_log(path)), channels)
+    log = read_log(path)
+    columns = choose(table(log), channels)
     with replacing(out) as stream:
-        FORMATS[suffix](columns, stream)
+        FORMATS[suffix](columns, units_of(log), stream)
     return list(columns)

@@ -38,24 +38,28 @@ class _Column:
 
     def __init__(self, topic: Topic, schema: Schema) -> None:
         self.topic = topic
+        self.own_too = topic.open and schema.name == topic.schema_name
         self.parse: Callable[[bytes], Any] = message_class(schema).FromString
         self.log_time: list[int] = []
         self.sequence: list[int] = []
         self.messages: list[Any] = []
 
     def table(self) -> dict[str, np.ndarray]:
-        """The channel's columns in the order of time: those of our fields that its schema has as numbers."""
+        """The channel's columns in the order of time: those of our fields that its schema has as numbers, and an open topic's own."""
         columns: dict[str, np.ndarray] = {
             "_log_time": np.array(self.log_time, np.uint64),
             "_sequence": np.array(self.sequence, np.uint32),
         }
         declarations: Any = self.messages[0].DESCRIPTOR.fields_by_name if self.messages else {}
-        for f in self.topic.fields:
-            declared = declarations.get(f.name)
+        kinds = {f.name: {"bool": bool, "fixed32": np.uint32}.get(f.kind, float) for f in self.topic.fields}
+        if self.own_too:
+            own = sorted(declarations.values(), key=lambda declared: declared.number) if declarations else []
+            kinds |= {f.name: float for f in own if f.name not in kinds and f.type == f.TYPE_DOUBLE}
+        for name, kind in kinds.items():
+            declared = declarations.get(name)
             if declared is None or declared.message_type is not None or declared.is_repeated:
                 continue
-            values = [getattr(m, f.name) for m in self.messages]
-            columns[f.name] = np.array(values, {"bool": bool, "fixed32": np.uint32}.get(f.kind, float))
+            columns[name] = np.array([getattr(m, name) for m in self.messages], kind)
         if (columns["_log_time"][1:] < columns["_log_time"][:-1]).any():
             order = np.argsort(columns["_log_time"], kind="stable")
             columns = {name: values[order] for name, values in columns.items()}

@@ -28,10 +28,11 @@ from fatigue_runner.trajectory import Trajectory
 class Log(Trajectory):
     """A trajectory that was read from a log, with what the log says about it.
 
-    Topics that the log does not hold are empty arrays; states and wind signals that it does not hold are
-    NaN; wind (n, 3 + 2 M) goes up to the highest azimuthal harmonic that it holds. reference_error (n-1,),
-    clamped_lookups_at (n-1,) counts per interval: empty where the log does not hold them. run, result, units:
-    metadata; complete: the whole run is there; lost: what was damaged, empty for a whole file.
+    Topics that the log does not hold are empty arrays; states of the turbine and wind signals that it does not
+    hold are NaN. `states` goes on with the further ones that it holds, wind (n, 3 + 2 M) up to its highest
+    azimuthal harmonic. reference_error (n-1,), clamped_lookups_at (n-1,) counts per interval: empty where the
+    log does not hold them. run, result, units: metadata; complete: the whole run is there; lost: what was
+    damaged, empty for a whole file.
     """
 
     reference_error: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -161,7 +162,13 @@ def assemble(tables: Tables, rows: int, intervals: int, contents: Contents) -> L
     time = clock["time"] if "time" in clock else clock["_log_time"] / 1e9
     loads = tables.get("loads", {})
     status = tables.get("status", {})
-    log = Log(time[:rows], matrix("state", channels.STATE_NAMES), matrix("wind", _wind_names(tables)))
+    states = _states(tables, contents.metadata.get("units", {}))
+    log = Log(
+        time[:rows],
+        matrix("state", [c.name for c in states]),
+        matrix("wind", _wind_names(tables)),
+        states=states,
+    )
     log.loads = {k: v[:rows] for k, v in loads.items() if k != "time" and not k.startswith("_")}
     for name in STATUS_ARRAYS:
         if name in status:
@@ -171,6 +178,17 @@ def assemble(tables: Tables, rows: int, intervals: int, contents: Contents) -> L
     log.clamped_lookups_at = status.get(clamped, log.clamped_lookups_at)[:intervals]
     _take_metadata(log, contents)
     return log
+
+
+def _states(tables: Tables, units: Mapping[str, str]) -> tuple[channels.Channel, ...]:
+    """The turbine's states and the further ones that the log holds, which are read in SI."""
+    own = TOPICS["state"].further(tables.get("state", ()))
+    known = channels.BY_NAME
+    units = {name: units.get(name, "-") for name in own}
+    return (
+        *channels.STATES,
+        *(known.get(n) or channels.Channel(n, units[n], n.replace("_", " "), units[n]) for n in own),
+    )
 
 
 def _wind_names(tables: Tables) -> tuple[str, ...]:

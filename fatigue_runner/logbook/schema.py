@@ -2,7 +2,8 @@
 
 Numbers are for ever: `time` is 1, a channel is its position in `channels` plus 2, so channels are only ever
 added at the end of their list; the wind's azimuthal harmonics, of which a log has as many as its wind, count
-from 101 on. A schema names the fields that the log holds and no others, since a proto3 reader shows a declared
+from 101 on. States of first order, of a controller say, follow those of the turbine: each log says by its schema
+which it has. A schema names the fields that the log holds and no others, since a proto3 reader shows a declared
 but absent double as 0.0, which nobody could tell from a measurement.
 """
 
@@ -51,13 +52,17 @@ class Field:
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic: key of the API, name in the file, message and the message's fields."""
+    """One topic: key of the API, name in the file, message and the message's fields.
+
+    open: a log's own fields may follow those of the table below.
+    """
 
     key: str
     name: str
     message: str
     channel_id: int
     fields: tuple[Field, ...]
+    open: bool = False
 
     @property
     def schema_name(self) -> str:
@@ -73,6 +78,14 @@ class Topic:
         """The same topic with `time` and those fields that are named."""
         wanted = {"time", *names}
         return replace(self, fields=tuple(f for f in self.fields if f.name in wanted))
+
+    def of(self, signals: Iterable[channels.Channel]) -> Topic:
+        """The same topic of all these signals, which begin with its own."""
+        return replace(self, fields=_fields(signals))
+
+    def further(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Those of a log's columns of this topic that are the log's own, in their order."""
+        return tuple(n for n in names if n not in self.field_names and not n.startswith("_"))
 
 
 # log_time is rounded to ns; `time` keeps the bits, so that a duration, and with it a DEL, is the one in
@@ -103,7 +116,7 @@ _HARMONICS = tuple(
 # In the order of a row: the status of the interval that ends at a time comes before the state at that time.
 TOPICS: dict[str, Topic] = {
     "status": Topic("status", "/solver/status", "Status", 3, STATUS_FIELDS),
-    "state": Topic("state", "/turbine/state", "State", 1, _fields(channels.STATES)),
+    "state": Topic("state", "/turbine/state", "State", 1, _fields(channels.STATES), open=True),
     "loads": Topic("loads", "/turbine/loads", "Loads", 2, _fields(channels.LOADS)),
     "wind": Topic("wind", "/wind", "Wind", 4, (*_fields(channels.WIND_SIGNALS), *_HARMONICS)),
 }

@@ -107,14 +107,14 @@ def _extreme(name: str, unit: str, values: np.ndarray, time: np.ndarray) -> Extr
 def extremes(log: Log) -> list[Extreme]:
     """Extremes of every channel in the log, loads first; without the azimuths, which only grow."""
     columns = dict(log.loads)
-    columns |= dict(zip(channels.STATE_NAMES, log.state.T, strict=False)) if len(log.state) else {}
+    columns |= dict(zip((c.name for c in log.states), log.state.T, strict=True)) if len(log.state) else {}
     columns |= (
         dict(zip(channels.wind_names(log.wind.shape[1]), log.wind.T, strict=True)) if len(log.wind) else {}
     )
     found = []
     for name, values in columns.items():
         unit = channels.BY_NAME[name].unit if name in channels.BY_NAME else log.units.get(name, "")
-        extreme = None if unit == "rad" else _extreme(name, unit, values, log.time)
+        extreme = None if name in channels.GROWING else _extreme(name, unit, values, log.time)
         if extreme is not None:
             found.append(extreme)
     return found

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fatigue_runner.channels import STATE_NAMES
+from fatigue_runner.channels import Channel
 from fatigue_runner.errors import InputError
 
 # A reference state whose values agree to this fraction of their magnitude is constant: the rest is rounding.
@@ -15,10 +15,11 @@ CONSTANT_TO = 1e-10
 
 
 class Sampled(Protocol):
-    """What is compared: a `Trajectory`, or anything with its time (n,) [s] and state (n, 16)."""
+    """What is compared: a `Trajectory`, or anything with its time (n,) [s], state (n, k) and the k states' names."""
 
     time: np.ndarray
     state: np.ndarray
+    states: tuple[Channel, ...]
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,8 @@ def compare(test: Sampled, reference: Sampled) -> Accuracy:
     Raises InputError when the times differ (a case that diverged ends early: it has no accuracy) or a state
     is not finite.
     """
-    x, x_ref = _states(test, "test"), _states(reference, "reference")
+    names = [c.name for c in reference.states]
+    x, x_ref = _states(test, names, "test"), _states(reference, names, "reference")
     t, t_ref = np.asarray(test.time, dtype=float), np.asarray(reference.time, dtype=float)
     if t.shape != t_ref.shape:
         raise InputError(
@@ -82,31 +84,37 @@ def compare(test: Sampled, reference: Sampled) -> Accuracy:
     with np.errstate(divide="ignore", invalid="ignore"):  # 0 / 0 is not used, x / 0 is meant
         nrmse = np.where(rms == 0.0, 0.0, rms / _scales(x_ref))
     return Accuracy(
-        nrmse=dict(zip(STATE_NAMES, nrmse.tolist(), strict=True)),
+        nrmse=dict(zip(names, nrmse.tolist(), strict=True)),
         delta_e=float(np.mean((error / (np.abs(x_ref) + 1e-18)) ** 2)),
         delta_e_range=float(np.mean(nrmse**2)),
     )
 
 
 def _scales(x_ref: np.ndarray) -> np.ndarray:
-    """What each state's error is divided by, (16,): its range, or its magnitude where it is constant."""
+    """What each state's error is divided by: its range, or its magnitude where it is constant."""
     magnitude, extent = np.abs(x_ref).max(axis=0), np.ptp(x_ref, axis=0)
     return np.where(extent <= CONSTANT_TO * magnitude, magnitude, extent)
 
 
-def _states(trajectory: Sampled, role: str) -> np.ndarray:
+def _states(trajectory: Sampled, names: list[str], role: str) -> np.ndarray:
     state = np.asarray(trajectory.state, dtype=np.float64)
     samples = np.asarray(trajectory.time).size
-    if state.shape != (samples, len(STATE_NAMES)) or samples == 0:
+    own = [c.name for c in trajectory.states]
+    if own != names:
+        differing = sorted(set(own) ^ set(names)) or own
         raise InputError(
-            f"the {role}'s states must be (n, {len(STATE_NAMES)}) for n times, "
-            f"got {state.shape} and {samples} times"
+            f"trajectory and reference do not have the same states, {', '.join(differing)} differ; "
+            "compare cases of the same equations"
+        )
+    if state.shape != (samples, len(names)) or samples == 0:
+        raise InputError(
+            f"the {role}'s states must be (n, {len(names)}) for n times, got {state.shape} and {samples} times"
         )
     finite = np.isfinite(state)
     if not finite.all():
         row, column = (int(i) for i in np.argwhere(~finite)[0])
         raise InputError(
-            f"the {role}'s state {STATE_NAMES[column]} is {state[row, column]} at sample {row}; "
+            f"the {role}'s state {names[column]} is {state[row, column]} at sample {row}; "
             "a case that diverged has no accuracy"
         )
     return state

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from fatigue_runner.channels import LOADS, STATES
+from fatigue_runner.channels import LOADS, STATES, Channel
 
 Kind = Literal["number", "whole", "truth", "text"]
 Group = Literal[
@@ -84,12 +84,14 @@ def fatigue_keys(channels: Sequence[str], exponents: Sequence[float]) -> list[tu
     return [(channel, m, f"{channel}_m{m:g}") for channel in channels for m in exponents]
 
 
-def table(channels: Sequence[str], exponents: Sequence[float]) -> list[Column]:
-    """All columns of the results table in their order, for these fatigue channels and Wöhler exponents."""
+def table(
+    channels: Sequence[str], exponents: Sequence[float], states: Sequence[Channel] = STATES
+) -> list[Column]:
+    """All columns of the results table in their order, for these fatigue channels, Wöhler exponents and states."""
     loads = {load.name: load for load in LOADS}
-    states = [
+    errors = [
         Column(f"nrmse_{state.name}", "accuracy", f"RMS error over the reference's range: {state.label}")
-        for state in STATES
+        for state in states
     ]
     fatigue = [
         Column(f"{figure}_{suffix}", "fatigue", meaning.format(m=m, label=loads[channel].label), unit or loads[channel].unit)
@@ -101,12 +103,14 @@ def table(channels: Sequence[str], exponents: Sequence[float]) -> list[Column]:
         for load in LOADS
         for figure, word in _STATISTICS
     ]
-    return [*CASE, *states, *fatigue, *statistics]
+    return [*CASE, *errors, *fatigue, *statistics]
 
 
-def columns(channels: Sequence[str], exponents: Sequence[float]) -> list[str]:
+def columns(
+    channels: Sequence[str], exponents: Sequence[float], states: Sequence[Channel] = STATES
+) -> list[str]:
     """Their names."""
-    return [column.name for column in table(channels, exponents)]
+    return [column.name for column in table(channels, exponents, states)]
 
 
 def of_group(*groups: Group) -> tuple[str, ...]:

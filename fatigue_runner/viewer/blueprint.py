@@ -218,7 +218,7 @@ def _all_loads(cases: Sequence[Viewed]) -> rrb.Grid:
 
 def _all_states(cases: Sequence[Viewed]) -> rrb.Grid:
     groups: dict[str, list[str]] = {}
-    for channel in channels.STATES:
+    for channel in dict.fromkeys(channel for case in cases for channel in case.log.states):
         if len(cases) > 1 and channel.name.startswith(("blade2", "blade3")):
             continue
         label = f"{_blade_free(channel.label, len(cases) == 1)} [{channel.read_unit}]"

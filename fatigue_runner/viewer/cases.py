@@ -17,7 +17,7 @@ from fatigue_runner.naming import integrator_label
 from fatigue_runner.results.columns import WIND
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.viewer import colours
-from fatigue_runner.viewer.scene import Geometry, geometry
+from fatigue_runner.viewer.scene import DRAWN, Geometry, geometry
 from fatigue_runner.viewer.shapes import BladeSkin, blade_skin
 
 MAX_CASES = 4  # side by side; more turbines are too small to see
@@ -132,7 +132,7 @@ def _readable(path: Path) -> Log:
         raise InputError(
             f"{path} holds no states to show; keep topic `state` in the campaign's `log: topics`"
         )
-    if not np.isfinite(log.state[:, :8]).any():
+    if not np.isfinite(log.state[:, DRAWN]).any():
         raise InputError(
             f"{path} holds no positions to show, only {', '.join(log.loads) or 'other channels'}"
         )

@@ -210,7 +210,7 @@ class Stage:
         index = np.arange(rows.start, rows.stop)
         index = index[index % stride == 0]
         time = log.time[index]
-        for place, channel in enumerate(channels.STATES):
+        for place, channel in enumerate(log.states):
             self._series(
                 f"plots/state/{channel.name}/{case.key}", time, log.state[index, place] * channel.scale
             )

@@ -95,8 +95,8 @@ class Geometry:
         Raises InputError for states of another shape.
         """
         state = np.asarray(state, float)
-        if state.ndim != 2 or state.shape[1] != len(STATE_NAMES):
-            raise InputError(f"states must have shape (n, {len(STATE_NAMES)}), got {state.shape}")
+        if state.ndim != 2 or state.shape[1] < len(STATE_NAMES):
+            raise InputError(f"states must have shape (n, {len(STATE_NAMES)} or more), got {state.shape}")
         a, s = scale * state[:, _FORE_AFT], scale * state[:, _SIDE_SIDE]
         tower = self._tower(a, s, np.linspace(0.0, self.tower.length, levels))
         nacelle = rotation_y(self.tower.fore_aft.top_slope * a) @ rotation_x(

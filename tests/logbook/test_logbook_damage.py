@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from logbook_example import ATTACHMENTS, RESULT, RUN, differing, example, same_bits
+from logbook_example import ATTACHMENTS, RESULT, RUN, differing, example, same_bits, with_states
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
@@ -27,15 +27,16 @@ from fatigue_runner.logbook import (
     write_log,
 )
 from fatigue_runner.logbook.records import walk
+from fatigue_runner.trajectory import Trajectory
 
 ROWS = 80
 
 
-def write_whole(folder: Path, compression: str) -> Path:
+def write_whole(folder: Path, compression: str, run: Trajectory | None = None) -> Path:
     """A whole log of ten chunks or so."""
     path = folder / f"{compression}.mcap"
     with LogWriter(path, run=RUN, attachments=ATTACHMENTS, compression=compression, chunk_size=6_000) as log:
-        log.append(example(ROWS))
+        log.append(run or example(ROWS))
         log.result.update(RESULT)
     return path
 
@@ -183,9 +184,11 @@ def test_a_cut_at_every_record_boundary_is_a_correct_partial_read(zstd_log, tmp_
         challenge(path, original, trajectory)
 
 
-def test_a_flipped_bit_in_any_byte_before_the_chunks_is_never_believed(zstd_log, tmp_path):
+@pytest.mark.parametrize("more", [False, True], ids=["the turbine's states", "and two more"])
+def test_a_flipped_bit_in_any_byte_before_the_chunks_is_never_believed(tmp_path, more):
     """Schemas, channels and metadata, also where the end of the file with its checksum is gone."""
-    original, trajectory = zstd_log.read_bytes(), example(ROWS)
+    trajectory = with_states(example(ROWS)) if more else example(ROWS)
+    original = write_whole(tmp_path, "zstd", trajectory).read_bytes()
     chunks = [r for r in walk(original) if r.opcode == Opcode.CHUNK]
     cut = original[: chunks[1].end]
     path = tmp_path / "damaged.mcap"
@@ -195,7 +198,9 @@ def test_a_flipped_bit_in_any_byte_before_the_chunks_is_never_believed(zstd_log,
         data[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(data)
         try:
-            assert_true_prefix(read_log(path, partial=True), trajectory)
+            log = read_log(path, partial=True)
+            assert_true_prefix(log, trajectory)
+            assert [c.name for c in log.states] == [c.name for c in trajectory.states]
         except LogError as error:
             assert "\n" not in str(error)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from google.protobuf import descriptor_pb2
-from logbook_example import RUN, differing, example, same_bits
+from logbook_example import MORE, RUN, differing, example, same_bits, with_states
 from mcap.reader import make_reader
 from mcap.records import Schema
 from mcap.writer import CompressionType, Writer
@@ -62,6 +62,14 @@ def test_a_log_that_another_program_rewrote_comes_back_to_the_bit(tmp_path):
     log = read_log(_rewrite(path, tmp_path / "b.mcap"))
     assert differing(log, trajectory) == []
     assert log.complete and RUN.items() <= log.run.items()
+
+
+def test_states_of_first_order_come_back_from_a_file_that_another_program_rewrote(tmp_path):
+    trajectory = with_states(example(100))
+    log = read_log(_rewrite(write_log(tmp_path / "a.mcap", trajectory, RUN), tmp_path / "b.mcap"))
+    assert differing(log, trajectory) == []
+    assert [c.name for c in log.states[-2:]] == [c.name for c in MORE]
+    assert log.states[-1].unit == "N.m"
 
 
 def test_a_window_that_a_tool_cut_out_of_a_log_is_read_but_not_complete(tmp_path):

@@ -10,6 +10,7 @@ import numpy as np
 
 from fatigue_runner.benchmark.study.cases import Cases
 from fatigue_runner.benchmark.study.integrators import CLASSICAL, kind, series
+from fatigue_runner.channels import STATES, Channel
 from fatigue_runner.integrators import HYBRID, Integrator
 from fatigue_runner.naming import integrator_label
 
@@ -77,6 +78,7 @@ class Sample:
 
     time: np.ndarray
     state: np.ndarray
+    states: tuple[Channel, ...] = STATES
 
 
 @dataclass
@@ -152,7 +154,6 @@ def evaluate(block: Sequence[Any], reference: Reference, cases: Cases, point: Po
 def reference_quality(cases: Cases, reference: Reference) -> list[dict[str, Any]]:
     """How far the reference is from itself at half its step, and from another method of high order at both: NRMSE of the worst
     state of the worst case, that state and how far it moves at least in a case, largest DEL error."""
-    from fatigue_runner.channels import STATE_NAMES
 
     moves = np.min([np.ptp(t.state, axis=0) for t in reference.trajectories], axis=0)
     method, step = cases.reference.method, cases.reference.step
@@ -168,7 +169,7 @@ def reference_quality(cases: Cases, reference: Reference) -> list[dict[str, Any]
                 "method": name,
                 "step": size,
                 "state": state,
-                "moves": float(moves[STATE_NAMES.index(state)]) if state else None,
+                "moves": float(moves[[c.name for c in STATES].index(state)]) if state else None,
                 "nrmse_worst": point.nrmse_worst,
                 "del_error_max": point.del_error_max,
                 "diverged": point.diverged,
