@@ -165,12 +165,13 @@ def _blowing(named: Realisation, rotor: Rotor, duration: float, where: str) -> W
         _check_speed(named.mean_speed, where)
     try:
         wind = named.build(rotor)
+        speed, length = wind.mean_speed, wind.length  # a file's are known when it has been read
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    _check_speed(wind.mean_speed, where)
-    if wind.length < duration * (1 - 1e-9):
+    _check_speed(speed, where)
+    if length < duration * (1 - 1e-9):
         raise InputError(
-            f"{where}: the wind {wind.name} is {wind.length:g} s long, the campaign runs "
+            f"{where}: the wind {wind.name} is {length:g} s long, the campaign runs "
             f"{duration:g} s; give a longer file or a shorter `duration`"
         )
     return wind

@@ -15,7 +15,7 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.layout import MOST_HARMONICS, WIND
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
-from fatigue_runner.wind.profiles import PowerLaw, Profile, profile_amplitudes, profile_disc_fit
+from fatigue_runner.wind.profiles import Logarithmic, PowerLaw, Profile, profile_amplitudes, profile_disc_fit
 from fatigue_runner.wind.radial_weight import RadialWeight
 
 # what a wind that blows on no turbine yet is made for: the NREL 5 MW
@@ -31,6 +31,15 @@ def checked_harmonics(what: str, harmonics: Any) -> int:
             f"{DEFAULT_HARMONICS} hold 98 % of every load range, 1 is linear shear only"
         )
     return int(harmonics)
+
+
+def mean_profile(what: str, shear_exponent: Any, roughness_length: Any) -> Profile | None:
+    """The profile of a mean wind by its one parameter; None where neither is given. Raises InputError for both and for impossible ones."""
+    if shear_exponent is not None and roughness_length is not None:
+        raise InputError(f"{what} has both shear_exponent and roughness_length; give one of the two")
+    if roughness_length is not None:
+        return Logarithmic(roughness_length)
+    return None if shear_exponent is None else PowerLaw(shear_exponent)
 
 
 def checked_order(what: str, harmonics: Any, shear_exponent: Any, vertical_shear: float) -> int | None:

@@ -27,7 +27,9 @@ from fatigue_runner.wind.checks import number
 
 
 class Profile(Protocol):
-    """Mean wind over height."""
+    """Mean wind over height; hashable, so that what is computed for one profile can be kept."""
+
+    def __hash__(self) -> int: ...
 
     def factor(self, height: np.ndarray, reference_height: float) -> np.ndarray:
         """Wind at `height` [m] over the wind at `reference_height` [m]."""

@@ -167,13 +167,18 @@ BEHIND = {
 }
 
 
+def summary_of(path: Path) -> Path | None:
+    """The summary that lies beside a `.wnd`, if there is one."""
+    beside = (path.with_suffix(suffix) for suffix in (".sum", ".SUM"))
+    return next((p for p in beside if p.exists()), None)
+
+
 def _summary(path: Path) -> Summary:
     """The `.sum` beside a `.wnd`; raises InputError where it is missing or lacks a number."""
-    beside = [path.with_suffix(suffix) for suffix in (".sum", ".SUM")]
-    place: Path | None = next((p for p in beside if p.exists()), None)
+    place = summary_of(path)
     if place is None:
         raise InputError(
-            f"{path}: the scale of its integers stands in {beside[0].name}, which is missing; put it beside the .wnd, "
+            f"{path}: the scale of its integers stands in {path.stem}.sum, which is missing; put it beside the .wnd, "
             "or make a .bts"
         )
     found: dict[str, tuple[int, float]] = {}

@@ -100,14 +100,6 @@ class WindField:
         """Field time [s] that passes the plane `x` [m] (downwind positive) at run time 0."""
         return (self.upstream - x) / self.mean_speed
 
-    def refuse_mean(self, said: float) -> None:
-        """Raises InputError where another mean wind speed [m/s] is asked for than the file has."""
-        if abs(self.mean_speed - said) > 0.1:  # m/s, as InflowWind
-            raise InputError(
-                f"{self.source}: the field has a mean wind speed of {self.mean_speed:g} m/s, but {said:g} m/s is asked "
-                "for; leave that out or take another file"
-            )
-
     def refuse_rotor(self, hub_height: float, rotor_radius: float) -> None:
         """Raises InputError where the grid does not cover the rotor, or was made for another hub."""
         slack = 1e-3 * (self.z[1] - self.z[0])  # InflowWind's GridTol
@@ -124,6 +116,15 @@ class WindField:
                 f"{self.source}: the field was made for a hub at {self.reference_height:g} m, but the turbine's is "
                 f"at {hub_height:g} m; make the field for that height"
             )
+
+
+def refuse_mean(source: Path, mean_speed: float, said: float) -> None:
+    """Raises InputError where another mean wind speed [m/s] is asked for than the file has."""
+    if abs(mean_speed - said) > 0.1:  # m/s, as InflowWind
+        raise InputError(
+            f"{source}: the field has a mean wind speed of {mean_speed:.6g} m/s, but {said:g} m/s is asked for; leave that out "
+            "or take another file"
+        )
 
 
 def grid(count: int, spacing: float, start: float) -> np.ndarray:

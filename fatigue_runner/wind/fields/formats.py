@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.wind.fields.bladed import is_bladed, read_bladed
-from fatigue_runner.wind.fields.field import WindField
+from fatigue_runner.wind.fields.field import WindField, refuse_mean
 from fatigue_runner.wind.fields.files import read_bytes
 from fatigue_runner.wind.fields.hawc import MannBox, read_hawc
 from fatigue_runner.wind.fields.turbsim import read_turbsim
@@ -28,12 +28,12 @@ def read_wind(
     """The wind of a file in any of the formats, by its ending and, for `.wnd`, by its first bytes.
 
     `hub_height` and `rotor_diameter` [m] are what uniform wind refers to; `box` is what a Mann box does not say
-    itself. Raises InputError for an unknown ending, for a full field whose file has another mean than
-    `mean_speed` [m/s], and whatever the format's reader raises.
+    itself. Raises InputError for an unknown ending, for a file that has another mean than `mean_speed` [m/s],
+    and whatever the format's reader raises.
     """
     wind = _read(Path(path), hub_height, rotor_diameter, box)
-    if mean_speed is not None and isinstance(wind, WindField):
-        wind.refuse_mean(mean_speed)
+    if mean_speed is not None:
+        refuse_mean(wind.source, wind.mean_speed, mean_speed)
     return wind
 
 

@@ -19,6 +19,7 @@ from fatigue_runner.wind.fields.field import WindField, centred, grid
 from fatigue_runner.wind.fields.files import read_bytes, read_text
 from fatigue_runner.wind.profiles import PowerLaw, Profile
 
+DESCRIPTIONS = (".hawc", ".htc")  # text that names the u component's file and its sizes
 DIMENSIONS = ("box_dim_u", "box_dim_v", "box_dim_w")  # along x, y, z
 FASTEST = 200.0  # m/s: no box has such a wind, but floats read in the wrong order do
 
@@ -70,7 +71,7 @@ def read_hawc(path: str | Path, box: MannBox) -> WindField:
     for a box without turbulence that is to be scaled.
     """
     path = Path(path)
-    if path.suffix.lower() in (".hawc", ".htc"):
+    if path.suffix.lower() in DESCRIPTIONS:
         path, box = _described(path, box)
     if box.points is None or box.spacing is None:
         raise InputError(
@@ -141,20 +142,30 @@ def _scale(path: Path, u: np.ndarray, box: MannBox) -> np.float32:
     return np.float32((box.sigma or 0.0) / found)
 
 
-def _described(path: Path, box: MannBox) -> tuple[Path, MannBox]:
-    """File of the u component and the sizes that a .hawc or .htc says between `begin mann` and `end mann`."""
+def described_file(path: Path) -> Path:
+    """The u component's file of a .hawc or .htc; raises InputError where it names none."""
+    return path.parent / _said(path)["filename_u"][0]
+
+
+def _said(path: Path) -> dict[str, list[str]]:
+    """The words behind `filename_u` and DIMENSIONS in a .hawc or .htc, between `begin mann` and `end mann`."""
     said: dict[str, list[str]] = {}
     for line in read_text(path):
         key, *words = line.split(";", 1)[0].split() or [""]
-        if key in ("filename_u", *DIMENSIONS):
+        if key in ("filename_u", *DIMENSIONS) and words:
             said[key] = words
     for key in ("filename_u", *DIMENSIONS):
         if key not in said:
             raise InputError(
                 f"{path}: no line says {key}; it must describe a turbulence box (begin mann ...)"
             )
+    return said
+
+
+def _described(path: Path, box: MannBox) -> tuple[Path, MannBox]:
+    """File of the u component and the sizes that a .hawc or .htc says."""
+    said = _said(path)
     try:
-        name = said["filename_u"][0]
         points = tuple(int(said[key][0]) for key in DIMENSIONS)
         spacing = tuple(float(said[key][1]) for key in DIMENSIONS)
     except (IndexError, ValueError):
@@ -165,4 +176,4 @@ def _described(path: Path, box: MannBox) -> tuple[Path, MannBox]:
     for given, here, what in ((box.points, points, "points"), (box.spacing, spacing, "spacing")):
         if given is not None and not np.allclose(given, here, rtol=1e-4):
             raise InputError(f"{path}: it says {what} {here}, but {given} are asked for; leave them out")
-    return path.parent / name, replace(box, points=points, spacing=spacing)
+    return described_file(path), replace(box, points=points, spacing=spacing)

@@ -40,7 +40,7 @@ COLUMNS = (
     "upflow",
 )
 WITHOUT_UPFLOW = 8
-STEP = 0.05  # s, where the file's own times are not uniform
+STEP = 0.05  # s, where the file's own times are not uniform or far apart: between them its wind is linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +69,9 @@ class UniformWind:
 
     @property
     def time_step(self) -> float:
-        """The file's own time step [s] where it is uniform, else STEP."""
+        """The file's own time step [s] where it is uniform and fine, else STEP."""
         steps = np.diff(self.time)
-        if len(steps) > 2 and np.allclose(steps, steps[0], rtol=1e-3, atol=1e-6):
+        if len(steps) > 2 and steps[0] <= 2 * STEP and np.allclose(steps, steps[0], rtol=1e-3, atol=1e-6):
             return float(f"{(self.time[-1] - self.time[0]) / len(steps):.9g}")
         return STEP
 
@@ -114,6 +114,13 @@ def read_uniform(path: str | Path, reference_height: float, reference_length: fl
     notes = []
     if table[0, 0] > 0:
         notes.append(f"{path} begins at {table[0, 0]:g} s; until then its first line holds.")
+    speed, direction, vertical, *_, upflow = values.T
+    across = np.hypot(speed * np.sin(direction), vertical + speed * np.sin(upflow)).max()
+    if across > 0.01:
+        notes.append(
+            f"{path} has up to {across:.3g} m/s of wind across the shaft's horizontal (direction, vertical speed, upflow); "
+            "the blades feel the wind along it only."
+        )
     wind = UniformWind(table[:, 0], values, reference_height, reference_length, path, tuple(notes))
     if not wind.mean_speed > 0:
         raise InputError(f"{path}: the mean wind speed is {wind.mean_speed:g} m/s; it must be positive")
