@@ -44,6 +44,7 @@ def simulate(
     pitch: float | PitchSeries = 0.0,
     corrector: Any = None,
     mode: str = "enhanced",
+    operation: str = "fixed",
 ) -> Trajectory:
     """Simulate one case and return its trajectory.
 
@@ -51,7 +52,8 @@ def simulate(
     duration [s]; initial: "operating-point", "paper", "paper-spinning" or a state; output_step [s]:
     None samples every step, else the solution is interpolated; pitch [rad]: a number, or a PitchSeries for a
     pitch that varies in time. A case that diverges ends early: see `diverged_at`. corrector: a name of
-    `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid", which guards it. Raises InputError
+    `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid", which guards it. operation: "fixed" holds the pitch, "controlled"
+    has the turbine's controller, "torque-law" its torque at fine pitch. Raises InputError
     for an unknown method or turbine, a step that is not positive and a malformed state.
     """
     from fatigue_runner.integrators import Ensemble, Integrator
@@ -59,6 +61,11 @@ def simulate(
 
     if isinstance(turbine, str):
         turbine = load_turbine(turbine)
+    turbine = turbine.operated(operation)
+    if operation != "fixed" and (isinstance(pitch, PitchSeries) or pitch):
+        raise InputError(
+            f"operation {operation!r} makes the pitch itself; give none, or use operation='fixed'"
+        )
     if isinstance(wind, int | float):
         wind = ConstantWind(float(wind))
     for name, value in (("step", step), ("duration", duration), ("output_step", output_step)):

@@ -18,7 +18,8 @@ class Trajectory:
     loads {channel: (n,)} SI. The status arrays have one entry per output interval, (n-1,): `accepted` is False where any
     step in the interval fell back, `discrepancy` and `threshold` are the hybrid's norms (NaN where there is no test),
     `local_error` the embedded error estimate's largest scaled component (NaN for methods without one).
-    `diverged_at` [s] is None for a finished case; otherwise the arrays end there.
+    `diverged_at` [s] is None for a finished case; otherwise the arrays end there. pitch (n,) [rad]; control {state of the controller:
+    (n,)}, empty where the pitch is given.
     """
 
     time: np.ndarray
@@ -35,6 +36,8 @@ class Trajectory:
     wall_time: float = 0.0
     diverged_at: float | None = None
     states: tuple[Channel, ...] = T2B1I1CG.states
+    pitch: np.ndarray = field(default_factory=lambda: np.empty(0))
+    control: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:

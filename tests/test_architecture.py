@@ -32,7 +32,8 @@ FLOOR = {
 # Which rooms a room may import. A new room is one line here.
 MAY_IMPORT = {
     "inputs": set(),
-    "turbine": {"inputs"},
+    "control": set(),
+    "turbine": {"inputs", "control"},
     "wind": {"inputs"},
     "fatigue": set(),
     "logbook": set(),

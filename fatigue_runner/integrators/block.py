@@ -182,14 +182,15 @@ def _trajectory(
     # copies: a slice would keep the whole block's memory alive
     time_points, own = plan.time[:n].copy(), state[:n].copy()
     error, distance = out.errors[: n - 1, lane].copy(), out.discrepancy[: n - 1, lane].copy()
-    signals, pitch = wind.at(time_points), block.pitch
+    signals, turbine = wind.at(time_points), block.turbine
+    pitch = block.pitch.at(time_points) if isinstance(block.pitch, PitchSeries) else block.pitch
+    commanded = turbine.commanded(own)
+    layout = block.data.model.layout
     return Trajectory(
         time=time_points,
         state=own,
         wind=signals,
-        loads=block.turbine.loads(
-            own, signals, pitch.at(time_points) if isinstance(pitch, PitchSeries) else pitch
-        ),
+        loads=turbine.loads(own, signals, 0.0 if commanded else pitch),
         accepted=out.accepted[: n - 1, lane].copy(),
         discrepancy=np.full(n - 1, np.nan) if np.isnan(limit) else distance,
         threshold=np.full(n - 1, limit),
@@ -200,4 +201,6 @@ def _trajectory(
         wall_time=group.wall / lanes,
         diverged_at=diverged_at if diverged_at >= 0 else None,
         states=block.data.model.layout.states,
+        pitch=commanded["pitch"] if commanded else np.broadcast_to(pitch, n).astype(float),
+        control={name: own[:, layout.row(name)].copy() for name in layout.names[2 * layout.freedoms :]},
     )

@@ -34,4 +34,7 @@ def initial_state(turbine: Any, initial: str | Any, wind: Any, pitch: float = 0.
         state[layout.generator] = generator
         state[layout.rotor_speed] = math.pi / 3
         state[layout.generator_speed] = generator
+        # a filter that has followed for long shows the speed itself
+        if "filtered_generator_speed" in layout.names:
+            state[layout.row("filtered_generator_speed")] = generator
     return state

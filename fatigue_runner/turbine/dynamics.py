@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from fatigue_runner.control import BASELINE
+from fatigue_runner.errors import InputError
 from fatigue_runner.layout import T2B1I1CG, Layout
 
 if TYPE_CHECKING:
@@ -34,4 +36,16 @@ def _uncontrolled(varying_pitch: bool, harmonics: bool) -> Model:
     return model.HARMONIC if harmonics else model.FIXED_PITCH
 
 
+def _controlled(varying_pitch: bool, harmonics: bool) -> Model:
+    from fatigue_runner.turbine import model
+
+    if varying_pitch:
+        raise InputError(
+            "a controller makes the pitch itself; give no pitch over time, or use operation: fixed"
+        )
+    return model.CONTROLLED
+
+
 UNCONTROLLED = Dynamics(T2B1I1CG, _uncontrolled)
+# its wind may have harmonics or none
+BASELINE_CONTROLLED = Dynamics(T2B1I1CG.extended(first_order=BASELINE.states, harmonics=True), _controlled)

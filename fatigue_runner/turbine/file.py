@@ -133,6 +133,37 @@ class Generator(Section):
         return self
 
 
+class Control(Section):
+    """The baseline controller (`control.baseline`): gains at fine pitch, speeds of the high-speed side."""
+
+    rated_speed_rpm: Positive
+    proportional_gain: Positive
+    integral_gain: Positive
+    gain_schedule_pitch_deg: Positive
+    filter_frequency_hz: Positive
+    cut_in_speed_rpm: Positive
+    region_2_speed_rpm: Positive
+    largest_torque: Positive
+    fine_pitch_deg: float = 0.0
+    region_3_pitch_deg: Positive = 1.0
+    region_3_blend_deg: Positive = 0.25
+    saturation_blend_deg: Positive = 0.05
+    unwind_rate: Positive = 10.0
+    unwind_blend: Positive = 0.2
+    torque_blend: Positive = 300.0
+    pitch_rate_limit_deg: Positive = 8.0
+
+    @model_validator(mode="after")
+    def _rising_speeds(self) -> Control:
+        if not self.cut_in_speed_rpm < self.region_2_speed_rpm < self.rated_speed_rpm:
+            raise problem(
+                "speeds must rise from cut_in_speed_rpm over region_2_speed_rpm to rated_speed_rpm; "
+                f"got {self.cut_in_speed_rpm:g}, {self.region_2_speed_rpm:g}, {self.rated_speed_rpm:g}",
+                key="region_2_speed_rpm",
+            )
+        return self
+
+
 class Stations(Section):
     """A table: the names of its columns, and a row for every station."""
 
@@ -247,6 +278,7 @@ class TurbineFile(Section):
     nacelle: Nacelle
     drivetrain: Drivetrain
     generator: Generator
+    control: Control | None = None
     blade: Blade
     tower: Tower
     aerodynamics: Aerodynamics

@@ -22,8 +22,9 @@ from numba.extending import NativeValue, intrinsic, overload, register_model, ty
 from numpy.typing import NDArray
 
 from fatigue_runner.compiled import INLINE, njit
+from fatigue_runner.control import BASELINE
 from fatigue_runner.layout import PITCH, T2B1I1CG, Layout
-from fatigue_runner.turbine.generated import harmonic, kernel, pitched, pitched_harmonic
+from fatigue_runner.turbine.generated import controlled, harmonic, kernel, pitched, pitched_harmonic
 from fatigue_runner.turbine.lane_code import LANES
 
 Array = NDArray[np.float64]
@@ -166,6 +167,9 @@ def loads(model, x, wind, control, derivative, out, start, data):
 FIXED_PITCH = Model("fixed-pitch", kernel, T2B1I1CG)
 VARYING_PITCH = Model("varying-pitch", pitched, T2B1I1CG.extended(control=(PITCH,)))
 HARMONIC = Model("fixed-pitch-harmonic", harmonic, FIXED_PITCH.layout.extended(harmonics=True))
+CONTROLLED = Model(
+    "controlled", controlled, FIXED_PITCH.layout.extended(first_order=BASELINE.states, harmonics=True)
+)
 VARYING_PITCH_HARMONIC = Model(
     "varying-pitch-harmonic", pitched_harmonic, VARYING_PITCH.layout.extended(harmonics=True)
 )

@@ -26,6 +26,10 @@ class Equations(Protocol):
     @property
     def layout(self) -> Layout: ...
 
+    def guesses(self, wind: float) -> tuple[list[tuple[float, Array]], float]:
+        """(rotor speed [rad/s], first-order states) to start from, the best first; and the slowest speed that is operation."""
+        ...
+
     def rhs(
         self, state: Any, wind: Any, vertical_shear: Any = ..., horizontal_shear: Any = ..., pitch: Any = ...
     ) -> Array: ...
@@ -88,12 +92,11 @@ def _steady(
         more = mean[_FREEDOMS:] / own
         return np.array([mean[0], mean[1], flap.mean(), *harmonics, mean[_EDGE] / 50, *drive, *more])
 
-    # from the fastest rotation down, so that the point right of the power maximum is found, not the stalled one
-    for tip_speed_ratio in (7.5, 9.0, 6.0, 5.0, 10.5, 4.0, 3.0, 12.0):
-        speed = tip_speed_ratio * wind / p["radius"]
-        start = np.array([1.0, -0.5, wind * 0.35, 0.0, 0.0, 0.1, 2.0, speed, *np.zeros(len(own))])
+    guesses, slowest = turbine.guesses(wind)
+    for speed, states in guesses:
+        start = np.array([1.0, -0.5, wind * 0.35, 0.0, 0.0, 0.1, 2.0, speed, *(states / own)])
         found = root(residual, start, tol=1e-11)
-        if found.success and np.abs(found.fun).max() < 1e-6 and found.x[7] > 0.02:
+        if found.success and np.abs(found.fun).max() < 1e-6 and found.x[7] > slowest:
             return found.x * scale
     raise InputError(
         f"{turbine.name} has no steady rotation at {wind:g} m/s and {np.degrees(pitch):g} deg pitch; "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fatigue_runner.errors import InputError
+from fatigue_runner.control import baseline
+from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.layout import WIND, Layout, kernel_rows
 from fatigue_runner.rotor import SQUARE, Rotor
-from fatigue_runner.turbine.dynamics import UNCONTROLLED, Dynamics
-from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turbine_file
+from fatigue_runner.turbine.dynamics import BASELINE_CONTROLLED, UNCONTROLLED, Dynamics
+from fatigue_runner.turbine.file import Control, check_turbine, mapping_source, read_turbine_file
 from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
 
@@ -26,21 +27,84 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# fixed: the pitch is held, the torque follows the momentary speed; torque-law: the controller's torque at fine pitch; controlled: both
+FIXED, TORQUE_LAW, CONTROLLED = "fixed", "torque-law", "controlled"
+OPERATIONS = (FIXED, TORQUE_LAW, CONTROLLED)
+
 
 @dataclass(frozen=True, eq=False)
 class Turbine:
-    """One turbine of the type T2B1i1cG. `parameters` by `equations.PARAMETERS` [SI], at zero pitch; dynamics: what moves it."""
+    """One turbine of the type T2B1i1cG. `parameters` by `equations.PARAMETERS` [SI], at zero pitch.
+
+    control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it.
+    """
 
     name: str
     parameters: Mapping[str, float]
     tables: AeroTables
     description: str = ""
     dynamics: Dynamics = UNCONTROLLED
+    control: Mapping[str, Any] | None = None
+    operation: str = FIXED
 
     @property
     def layout(self) -> Layout:
         """The states and signals of its equations."""
         return self.dynamics.layout
+
+    def operated(self, operation: str) -> Turbine:
+        """The turbine in a mode of operation; itself where that is its own.
+
+        Raises InputError for an unknown mode, and for a controller that the turbine file does not have.
+        """
+        if operation not in OPERATIONS:
+            raise InputError(f"unknown operation {operation!r}{did_you_mean(str(operation), OPERATIONS)}")
+        if operation == self.operation:
+            return self
+        if operation != FIXED and self.control is None:
+            raise InputError(
+                f"turbine {self.name} has no `control` section, so that it cannot run with operation {operation!r}; "
+                "add one (compare nrel5mw.yaml) or use operation: fixed"
+            )
+        return _operated(self, operation)
+
+    @property
+    def control_parameters(self) -> dict[str, float]:
+        """`control.baseline.PARAMETERS` of this operation; none where the pitch is fixed."""
+        if self.operation == FIXED or self.control is None:
+            return {}
+        p = self.parameters
+        law = {key: p[key] for key in ("tg_k", "tg_a2", "tg_ws", "tg_p", "tg_t")} | {
+            "tg_e": self.control["torque_blend"]
+        }
+        return baseline.parameters(self.control, law, self.operation == CONTROLLED)
+
+    def commanded(self, state: ArrayLike) -> dict[str, Array]:
+        """Pitch [rad] and generator torque [N m] that the controller makes of states (..., k); empty where the pitch is fixed."""
+        if self.operation == FIXED:
+            return {}
+        x = np.asarray(state, float)
+        states = {name: x[..., i] for i, name in enumerate(self.layout.names)}
+        return baseline.outputs(states, self.control_parameters, np.sqrt)
+
+    def guesses(self, wind: float) -> tuple[list[tuple[float, Array]], float]:
+        """Where a search for steady rotation starts: see `steady.Equations`.
+
+        From the fastest rotation down, so that the point right of the power maximum is found, not the stalled one; under a controller
+        not faster than it holds, and no rotation that its cut-in is above.
+        """
+        radius = self.parameters["radius"]
+        none = np.zeros(len(self.layout.first_order))
+        if self.operation == FIXED:
+            ratios = (7.5, 9.0, 6.0, 5.0, 10.5, 4.0, 3.0, 12.0)
+            return [(ratio * wind / radius, none) for ratio in ratios], 0.02
+        control, gearbox = self.control_parameters, self.gearbox_ratio
+        found = []
+        for integral in baseline.INTEGRALS:
+            for ratio in (7.5, 9.0, 12.0, 14.0, 6.0, 5.0):
+                speed = min(ratio * wind / radius, control["ctl_rated"] / gearbox)
+                found.append((speed, np.array([gearbox * speed, integral])))
+        return found, 0.9 * control["ctl_cut_in"] / gearbox
 
     @property
     def hash(self) -> str:
@@ -123,6 +187,8 @@ class Turbine:
 
         angle, x, signals = (np.asarray(values, float) for values in (pitch, state, wind))
         harmonics = signals.shape[1] > len(self.layout.wind)
+        if self.operation != FIXED:
+            angle = np.asarray(0.0)
         signals = np.pad(signals, ((0, 0), (0, kernel_rows(signals.shape[1]) - signals.shape[1])))
         if angle.ndim:
             return load_channels(self.pitched_kernel_data(harmonics), x, signals, angle[:, None])
@@ -153,6 +219,12 @@ class Turbine:
 
 
 @lru_cache(maxsize=64)
+def _operated(turbine: Turbine, operation: str) -> Turbine:
+    dynamics = UNCONTROLLED if operation == FIXED else BASELINE_CONTROLLED
+    return replace(turbine, operation=operation, dynamics=dynamics)
+
+
+@lru_cache(maxsize=64)
 def _hash(turbine: Turbine) -> str:
     digest = hashlib.sha256()
     for name, value in sorted(turbine.parameters.items()):
@@ -163,6 +235,10 @@ def _hash(turbine: Turbine) -> str:
         digest.update(np.ascontiguousarray(values).tobytes())
     for name in sorted(turbine.tables.coefficients):
         digest.update(name.encode() + np.ascontiguousarray(turbine.tables.coefficients[name]).tobytes())
+    if turbine.operation != FIXED:
+        digest.update(turbine.operation.encode())
+        for name, value in sorted(turbine.control_parameters.items()):
+            digest.update(f"{name}={value:.8e};".encode())
     return digest.hexdigest()
 
 
@@ -194,7 +270,7 @@ def _data_for_every_pitch(turbine: Turbine, model: Model) -> KernelData:
     kernel = model.generated
     return KernelData(
         model=model,
-        constants=kernel.constants(turbine.parameters),
+        constants=kernel.constants({**turbine.parameters, **turbine.control_parameters}),
         tables=turbine.tables.pitched_cells(kernel.TABLES[: kernel.EQUATION_TABLES]),
         load_tables=turbine.tables.pitched_cells(kernel.TABLES),
         cells=len(turbine.tables.tip_speed_ratio) - 1,
@@ -230,7 +306,10 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     # a shipped turbine's tables are checked when the project is built; a user's may have been made before the blade changed
     if isinstance(source, Mapping) or Path(str(source)).suffix:
         _check_inputs(path, data)
-    return Turbine(name, parameters, tables, str(data.get("description", "")))
+    # a law without regions has no rated speed that a pitch could hold
+    given = data.get("control") if data["generator"]["law"] == "regions" else None
+    control = Control.model_validate(given).model_dump() if given else None
+    return Turbine(name, parameters, tables, str(data.get("description", "")), control=control)
 
 
 def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:

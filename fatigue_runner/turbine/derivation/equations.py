@@ -799,11 +799,17 @@ def aero_resultant(sheet: Sheet, aero: Aerodynamics) -> tuple[sp.Matrix, sp.Matr
     return sheet.let_vector("aero_force", force), sheet.let_vector("aero_moment", moment)
 
 
-def generator_torque(sheet: Sheet) -> sp.Expr:
-    """Regions 2, 2.5 and 3 of NREL/TP-500-38060, 7.2: min(max(k omega^2, line), power / omega), with smooth corners.
+COMMANDED = sp.Symbol("torque_commanded", real=True)  # generator torque where a controller makes it
+
+
+def generator_torque(sheet: Sheet, controlled: bool) -> sp.Expr:
+    """The controller's; or, of the momentary speed, regions 2, 2.5 and 3 of NREL/TP-500-38060, 7.2: min(max(k omega^2, line), power /
+    omega), with smooth corners.
 
     A kink where a trajectory passes costs every method its order (docs/decisions/0002).
     """
+    if controlled:
+        return COMMANDED
     w, blend = STATE[15], sheet.constant(P["tg_e"] ** 2)
     optimal = sheet.let("torque_optimal", P["tg_k"] * w * w)
     rise = sheet.let("torque_rise", P["tg_a2"] * (w - P["tg_ws"]) + P["tg_t2"] - optimal)
@@ -844,8 +850,8 @@ def tower_and_nacelle(sheet: Sheet, top: Motion) -> tuple[dict[str, sp.Expr], di
     return mass, force
 
 
-def accelerations(harmonics: bool = False) -> tuple[Sheet, tuple[sp.Expr, ...]]:
-    """The whole model: a sheet of assignments, and the 8 accelerations; harmonics: see `inflow`."""
+def accelerations(harmonics: bool = False, controlled: bool = False) -> tuple[Sheet, tuple[sp.Expr, ...]]:
+    """The whole model: a sheet of assignments, and the 8 accelerations; harmonics: see `inflow`; controlled: `generator_torque`."""
     sheet = Sheet()
     top = tower_top(sheet)
     m = hub(sheet, top)
@@ -857,7 +863,7 @@ def accelerations(harmonics: bool = False) -> tuple[Sheet, tuple[sp.Expr, ...]]:
     net_force = sheet.let_vector("net_force", aero_force - r.force)
     net_moment = sheet.let_vector("net_moment", aero_moment - r.moment)
     twist = shaft_torque(sheet)
-    torque = generator_torque(sheet)
+    torque = generator_torque(sheet, controlled)
 
     # columns of the mass matrix that belong to the rotor; `iw` = moment about the apex per unit acceleration
     columns = {"a": (m.t_a, m.w_a), "s": (m.t_s, m.w_s), "p": (sp.zeros(3, 1), sp.Matrix([1, 0, 0]))}
@@ -1015,8 +1021,9 @@ def from_blade(v, number: int) -> sp.Matrix:
     return rot_x_t(c, -s, cone(v))
 
 
-def load_channels(harmonics: bool = False) -> tuple[Sheet, dict[str, sp.Expr]]:
-    """Loads by their channel names from states, wind and the accelerations (`ACCELERATION`); harmonics: see `inflow`."""
+def load_channels(harmonics: bool = False, controlled: bool = False) -> tuple[Sheet, dict[str, sp.Expr]]:
+    """Loads by their channel names from states, wind and the accelerations (`ACCELERATION`); harmonics and controlled as in
+    `accelerations`."""
     sheet = Sheet()
     harmonic_sums(sheet, ("d",))
     top = tower_top(sheet)
@@ -1042,7 +1049,7 @@ def load_channels(harmonics: bool = False) -> tuple[Sheet, dict[str, sp.Expr]]:
     moment = sheet.let_vector("rotor_moment", moment)
     out |= tower_base(sheet, top, force, moment)
     out["low_speed_shaft_torque"] = shaft_torque(sheet)
-    out["generator_torque"] = generator_torque(sheet)
+    out["generator_torque"] = generator_torque(sheet, controlled)
     out["rotor_thrust"] = sheet.constant(3 * P["cos_cone"]) * aero.mean("thrust") * aero.pressure
     out["tower_top_fore_aft_acceleration"], out["tower_top_side_side_acceleration"] = ACCELERATION[0:2]
     return sheet, out

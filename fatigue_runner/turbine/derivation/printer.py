@@ -12,6 +12,8 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from fatigue_runner.channels import LOAD_NAMES
+from fatigue_runner.control import BASELINE
+from fatigue_runner.control import Submodel as Controller
 from fatigue_runner.layout import T2B1I1CG, Layout
 from fatigue_runner.turbine.derivation import equations as eq
 from fatigue_runner.turbine.derivation.pitching import PITCH, with_varying_pitch
@@ -36,6 +38,33 @@ class Variant:
     layout: Layout = T2B1I1CG
     varying_pitch: bool = False
     submodels: tuple[Submodel, ...] = field(default=())
+    controller: Controller | None = None
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Of the equations, then of the controller."""
+        return (*eq.PARAMETERS, *(self.controller.parameters if self.controller else ()))
+
+    def control_lines(self) -> Lines:
+        """What the controller commands, as the first lines of a sheet; none without one."""
+        if self.controller is None:
+            return []
+        made = self.controller.outputs(self.symbols, self.control_parameters, sp.sqrt)
+        return [(PITCH, made["pitch"]), (eq.COMMANDED, made["generator_torque"])]
+
+    def control_rates(self) -> dict[int, sp.Expr]:
+        """Derivatives of the controller's states by their rows."""
+        if self.controller is None:
+            return {}
+        made = self.controller.rates(self.symbols, self.control_parameters, sp.sqrt)
+        return {self.layout.row(name): rate for name, rate in made.items()}
+
+    @property
+    def control_parameters(self) -> dict[str, sp.Symbol]:
+        return {
+            name: sp.Symbol(name, real=True)
+            for name in (self.controller.parameters if self.controller else ())
+        }
 
     @property
     def symbols(self) -> dict[str, sp.Symbol]:
@@ -189,7 +218,7 @@ def kernel(
     inputs |= {c: f"constants[{i}]" for i, c in enumerate(constants)}
     phi = eq.STATE[variant.layout.rotor]
     source = [f"{phi} = {inputs.pop(phi)}"]
-    if variant.varying_pitch:
+    if PITCH in inputs:
         source.append(f"{PITCH} = {inputs.pop(PITCH)}")
     source += SINE_COSINE.format(sine=horner(1, 9), cosine=horner(0, 10)).rstrip("\n").split("\n")
 
@@ -252,8 +281,9 @@ def constants(parameters):
 def module(variant: Variant) -> str:
     """A generated module: its head, the constants, and the kernels `rhs` and `loads`."""
     layout = variant.layout
-    sheet, accelerations = eq.accelerations(layout.harmonics)
-    load_sheet, loads = eq.load_channels(layout.harmonics)
+    controlled = variant.controller is not None
+    sheet, accelerations = eq.accelerations(layout.harmonics, controlled)
+    load_sheet, loads = eq.load_channels(layout.harmonics, controlled)
     out = dict(enumerate(eq.STATE[layout.freedoms :])) | {
         layout.freedoms + i: a for i, a in enumerate(accelerations)
     }
@@ -261,13 +291,16 @@ def module(variant: Variant) -> str:
     if variant.varying_pitch:
         sheet, out = with_varying_pitch(sheet, out)
         load_sheet, load_out = with_varying_pitch(load_sheet, load_out)
+    for kernel_sheet in (sheet, load_sheet):
+        kernel_sheet.lines[:0] = variant.control_lines()
+    out |= variant.control_rates()
     for submodel in variant.submodels:
         out |= {layout.row(name): rate for name, rate in submodel.rates(variant.symbols).items()}
     # both sheets number their constants from k0: give the second its own letter
     rename = {s: sp.Symbol("l" + s.name[1:], real=True) for s in load_sheet.constants}
     load_sheet.lines = [(s, e.xreplace(rename)) for s, e in load_sheet.lines]
     load_out = {n: e.xreplace(rename) for n, e in load_out.items()}
-    symbols = [*eq.P.values(), *sheet.constants, *rename.values()]
+    symbols = [*eq.P.values(), *variant.control_parameters.values(), *sheet.constants, *rename.values()]
     definitions = {
         **sheet.constants,
         **{rename[s]: e.xreplace(rename) for s, e in load_sheet.constants.items()},
@@ -283,10 +316,10 @@ def module(variant: Variant) -> str:
                variant, load_sheet, load_out, True, variant.tables, symbols),
     ]  # fmt: skip
     head = HEAD.format(
-        doc=variant.doc, source=variant.source, parameters=repr(tuple(eq.PARAMETERS)), tables=repr(variant.tables),
+        doc=variant.doc, source=variant.source, parameters=repr(variant.parameters), tables=repr(variant.tables),
         width=variant.equation_tables, loads=repr(LOAD_NAMES), turned=" at zero pitch" if variant.varying_pitch else "",
     )  # fmt: skip
-    lines = [f"    {name} = p[{name!r}]" for name in eq.PARAMETERS]
+    lines = [f"    {name} = p[{name!r}]" for name in variant.parameters]
     lines += [f"    {s} = {PRINT(e)}" for s, e in definitions.items()]
     lines += ["    return np.array([", *(f"        {s}," for s in symbols), "    ], dtype=np.float64)"]
     return head + "\n".join(lines) + "\n\n\n" + "\n\n".join(kernels)
@@ -305,6 +338,13 @@ VARIANTS = {
         "The lane kernels at a fixed pitch, under wind with azimuthal harmonics.",
         f"{_FOLDER}/equations.py",
         FIXED_PITCH.layout.extended(harmonics=True),
+    ),
+    "controlled": Variant(
+        "The lane kernels with the baseline controller's states, pitch and torque, under wind with azimuthal harmonics.",
+        f"{_FOLDER}/equations.py and pitching.py, and fatigue_runner/control/baseline.py",
+        FIXED_PITCH.layout.extended(first_order=BASELINE.states, harmonics=True),
+        varying_pitch=True,
+        controller=BASELINE,
     ),
     "pitched_harmonic": Variant(
         "The lane kernels with each lane's pitch [rad] as a control signal, under wind with azimuthal harmonics.",
