@@ -28,6 +28,17 @@ def about(resolved: Resolved) -> dict[str, str]:
     }
 
 
+def wind_words(resolved: Resolved) -> dict[str, list[str]]:
+    """What the winds are, what they leave out and what is to be known of their files: each sentence once."""
+    sources = [wind.source for wind in resolved.winds]
+    said = {
+        "descriptions": [source.description for source in sources],
+        "left_out": [source.left_out for source in sources],
+        "notes": [note for wind in resolved.winds for note in wind.notes],
+    }
+    return {what: list(dict.fromkeys(filter(None, words))) for what, words in said.items()}
+
+
 def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()

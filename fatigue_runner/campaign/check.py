@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fatigue_runner import channels
+from fatigue_runner.campaign.about import wind_words
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.campaign.spec import Pitch
@@ -22,9 +23,7 @@ def check(resolved: Resolved) -> list[str]:
         except _Refused as refused:
             where = resolved.source.where((*integration.path, *refused.key))
             raise InputError(f"{where}: {refused}") from None
-    # a wind file is told of once, however many cases it has
-    notes = dict.fromkeys(note for wind in resolved.winds for note in wind.notes)
-    return [*notes, *_unseen_winds(resolved)]
+    return [*wind_words(resolved)["notes"], *_unseen_winds(resolved)]
 
 
 def _check_logged_channels(resolved: Resolved) -> None:

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fatigue_runner.campaign.about import about, resolved_yaml, turbine_yaml
+from fatigue_runner.campaign.about import about, resolved_yaml, turbine_yaml, wind_words
 from fatigue_runner.campaign.block import Setup, run_block
 from fatigue_runner.campaign.plan import Plan, make_plan
 from fatigue_runner.campaign.pool import connect, run_jobs
@@ -97,7 +97,8 @@ def _simulate(
         facts,
         {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan.resolved).encode()},
     )
-    store.open({"facts": facts, "campaign": plan.campaign.model_dump()}, text)
+    about_run = {"facts": facts, "campaign": plan.campaign.model_dump(), "wind": wind_words(plan.resolved)}
+    store.open(about_run, text)
     try:
         jobs = plan.jobs(store, setup, workers)
         pending = sum(len(job.cases) for job in jobs)

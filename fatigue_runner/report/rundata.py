@@ -47,9 +47,11 @@ class Run:
         rows: Sequence[Row],
         campaign: Mapping[str, Any],
         facts: Mapping[str, str] | None = None,
+        wind: Mapping[str, list[str]] | None = None,
     ) -> None:
         self.folder = folder
         self._facts = facts or {}
+        self._wind = wind or {}
         self.rows = list(rows)
         self.campaign = campaign
         self.summaries = rank(self.rows)
@@ -113,6 +115,13 @@ class Run:
         """A fact of the run by its name in run.json; empty where it is unknown."""
         return str((self._facts or self._facts_of_a_log()).get(name, ""))
 
+    def wind_words(self, what: str) -> list[str]:
+        """Sentences about the winds: "descriptions", "left_out" or "notes"; from a log where the folder does not say."""
+        if self._wind:
+            return list(self._wind.get(what, ()))
+        entry = {"descriptions": "wind_description", "left_out": "wind_left_out", "notes": "wind_notes"}[what]
+        return [words] if (words := self._facts_of_a_log().get(entry)) else []
+
     def _facts_of_a_log(self) -> dict[str, str]:
         logs = (self.log(text(row, "case_id")) for row in self.rows[:20])
         return next((dict(log.run) for log in logs if log is not None), {})
@@ -128,20 +137,20 @@ def load_run(folder: Path) -> Run:
     return Run(folder, rows, *_read_settings(folder))
 
 
-def _read_settings(folder: Path) -> tuple[Mapping[str, Any], Mapping[str, str]]:
-    """The resolved campaign and the facts (turbine, hash, versions, machine); empty where unknown."""
+def _read_settings(folder: Path) -> tuple[Mapping[str, Any], Mapping[str, str], Mapping[str, list[str]]]:
+    """The resolved campaign, the facts (turbine, hash, versions, machine), and what is said of the winds; empty where unknown."""
     try:
         stored = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        campaign, facts = stored["campaign"], stored.get("facts", {})
-        if isinstance(campaign, Mapping) and isinstance(facts, Mapping):
-            return campaign, facts
+        campaign, facts, wind = stored["campaign"], stored.get("facts", {}), stored.get("wind", {})
+        if all(isinstance(part, Mapping) for part in (campaign, facts, wind)):
+            return campaign, facts, wind
     except FileNotFoundError:
         pass
     except (OSError, ValueError, KeyError, TypeError):
         raise InputError(
             f"{folder / 'run.json'} cannot be read; run the campaign again into a new folder"
         ) from None
-    return _read_campaign(folder / "campaign.yaml"), {}
+    return _read_campaign(folder / "campaign.yaml"), {}, {}
 
 
 def _read_campaign(path: Path) -> Mapping[str, Any]:
