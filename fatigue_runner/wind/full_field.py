@@ -104,20 +104,27 @@ class FullFieldWind(WindSource):
         return {
             "vertical_shear": float(signals[:, 1].mean()),
             "horizontal_shear": float(signals[:, 2].mean()),
-            "turbulence_intensity": self._projected.hub_intensity,
+            "turbulence_intensity": self._found.harmonics.hub_intensity,
             "wind_file": Path(self.path).name,
         }
 
     @property
     def description(self) -> str:
+        if self._found.uniform:
+            return "the speed and the linear shears of a uniform wind file"
         return "the longitudinal wind of a full-field file, carried past the rotor as it is (Taylor's hypothesis)"
 
     @property
     def strength(self) -> str:
-        variances = self._signals.var(axis=0)
-        rotor, blade = variances[0], variances[0] + variances[len(WIND) :].sum() / 2
-        point = self._projected.hub_intensity * self.mean_speed
-        return told_strength(self.mean_speed, point, float(rotor**0.5), float(blade**0.5), self.order)
+        point = self._found.harmonics.hub_intensity
+        if point is None:
+            return ""
+        variances = self._coefficients[:, 0].var(axis=0)
+        rotor, blade = variances[0] ** 0.5, (variances[0] + variances[len(WIND) :].sum() / 2) ** 0.5
+        mean = self.mean_speed
+        return told_strength(
+            mean, point * mean, float(rotor), float(blade) if self.order > 1 else None, self.order
+        )
 
     @property
     def cell_key(self) -> float:

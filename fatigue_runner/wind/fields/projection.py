@@ -38,7 +38,7 @@ class FieldHarmonics:
     amplitudes (n, 1 + 2 M) [m/s] in the order c_0, c_1, s_1, ... of `wind.azimuth`: what the blades see.
     disc (n, 3) [m/s]: area-weighted mean v and slopes G_z, G_y per rotor radius of the least-squares plane, so
     that the linear shears are G_z / v and G_y / v: what the tip-speed ratio is made of. `mean_speed` [m/s] as
-    the file says it.
+    the file says it; hub_intensity: standard deviation over mean at the hub's point, None for a wind without points.
     """
 
     time_step: float
@@ -49,7 +49,7 @@ class FieldHarmonics:
     start: float = 0.0
     periodic: bool = False
     notes: tuple[str, ...] = field(default=())
-    hub_intensity: float = math.nan
+    hub_intensity: float | None = None
 
     @property
     def end(self) -> float:
