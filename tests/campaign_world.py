@@ -45,6 +45,7 @@ def build_world(monkeypatch: Any) -> World:
         hash="0" * 64,
         parameters={"g_ratio": 97.0},
         rotor=Rotor(63.0, 90.0),
+        operated=lambda operation: turbine,
         layout=T2B1I1CG,
         kernel_data=lambda pitch: None,
         operating_point=lambda speed, *shears, pitch: np.full(len(STATE_NAMES), 0.1 * speed),
@@ -70,7 +71,7 @@ def build_world(monkeypatch: Any) -> World:
     # the toy's reference is exact, and its calls are counted
     monkeypatch.setattr(run, "reference_facts", lambda plan, earlier: {})
     block._turbine.cache_clear()
-    monkeypatch.setattr(block, "_turbine", lambda source, expected_hash: turbine)
+    monkeypatch.setattr(block, "_turbine", lambda source, expected_hash, operation: turbine)
     return world
 
 

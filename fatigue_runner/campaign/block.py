@@ -57,7 +57,7 @@ def run_block(job: Job) -> list[dict[str, Any]]:
 
     No exception of one integrator or case ends the others: it becomes a row with the status `failed`.
     """
-    rotor = _turbine(job.setup.turbine, job.setup.turbine_hash).rotor
+    rotor = _turbine(job.setup.turbine, job.setup.turbine_hash, job.setup.campaign.operation).rotor
     winds = {case.wind: _wind(case, rotor) for case in [*job.references, *job.cases]}
     references: dict[Any, Evaluated | None] = {}
     wanted = {case.id for case in job.cases}
@@ -136,7 +136,7 @@ def simulate(
     from fatigue_runner import integrators
 
     campaign = setup.campaign
-    turbine = _turbine(setup.turbine, setup.turbine_hash)
+    turbine = _turbine(setup.turbine, setup.turbine_hash, campaign.operation)
     output_step = 1.0 / campaign.output_rate
     ensemble = integrators.Ensemble(
         turbine, winds, initial, campaign.duration, output_step, campaign.blade_pitch
@@ -145,11 +145,11 @@ def simulate(
 
 
 @functools.lru_cache(maxsize=4)
-def _turbine(source: str, expected_hash: str) -> Any:
+def _turbine(source: str, expected_hash: str, operation: str) -> Any:
     """The turbine, loaded once per worker; refused where it is not the one that the cases were made for."""
     from fatigue_runner.turbine import load_turbine
 
-    turbine = load_turbine(source)
+    turbine = load_turbine(source).operated(operation)
     if turbine.hash != expected_hash:
         raise FatigueRunnerError(
             f"turbine {source} changed while the campaign ran, or differs on this worker; run it again"

@@ -130,7 +130,10 @@ def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
         **{name: known(label.get(name)) for name in WIND},
         "wind_source": case.wind.kind,
         "wind_file": case.wind.file,
-        "pitch_deg": campaign.pitch if isinstance(campaign.pitch, float) else None,
+        "operation": campaign.operation,
+        "pitch_deg": campaign.pitch
+        if isinstance(campaign.pitch, float) and campaign.operation == "fixed"
+        else None,
         **_trained(case.integration),
     }
 

@@ -70,7 +70,7 @@ class Resolved:
 def resolve(campaign: Campaign, source: Source) -> Resolved:
     """Everything that a campaign names. Raises InputError, with the line, for what is not there, cannot be read or cannot be made."""
     turbine_source = _turbine_source(campaign, source)
-    turbine = _load_turbine(turbine_source, source)
+    turbine = _operated(_load_turbine(turbine_source, source), campaign, source)
     pitch = _pitch(campaign, turbine, source)
     integrations = _integrations(campaign, source)
     winds = _winds(campaign, turbine, pitch, source)
@@ -90,6 +90,13 @@ def _load_turbine(turbine: str, source: Source) -> Turbine:
         return load_turbine(turbine)
     except InputError as error:
         raise InputError(f"{source.where(('turbine',))}: {error}") from None
+
+
+def _operated(turbine: Turbine, campaign: Campaign, source: Source) -> Turbine:
+    try:
+        return turbine.operated(campaign.operation)
+    except InputError as error:
+        raise InputError(f"{source.where(('operation',))}: {error}") from None
 
 
 def _pitch(campaign: Campaign, turbine: Turbine, source: Source) -> float | PitchSeries:

@@ -5,8 +5,10 @@ turbine         `nrel5mw` (default), `t2b1i1cg` (the paper's: no tilt, no cone) 
 duration        simulated time of every case [s]
 output_rate     samples per second [Hz] of what is counted, compared and logged (default 50), at any step
 initial         state at t = 0: `operating-point` (default), `paper`, `paper-spinning`, or 16 numbers
-pitch           blade pitch [deg], the same for all cases (default 0); or {time: [s], angle: [deg]}, a smooth curve through samples
-                at equal steps from 0 to at least `duration` (not for correctors and exponential methods)
+operation       who steers: `fixed` (default: the pitch below, torque of the momentary speed), `controlled` (the turbine's
+                controller: pitch and torque, 3 to 25 m/s), `torque-law` (its torque at fine pitch)
+pitch           with `operation: fixed`: blade pitch [deg], the same for all cases (default 0); or {time: [s], angle: [deg]}, a smooth curve
+                through samples at equal steps from 0 to at least `duration` (not for correctors and exponential methods)
 discard         seconds dropped from the start before statistics, fatigue and errors (default 0)
 workers         parallel processes (default 2; `--workers` overrides it)
 
@@ -199,6 +201,7 @@ class Campaign(Section):
     output_rate: float = Field(default=50.0, gt=0, le=10_000)
     initial: Annotated[str | list[float], PlainValidator(_initial_state)] = "operating-point"
     pitch: Annotated[float | Pitch, PlainValidator(_pitch), PlainSerializer(_plain_pitch)] = 0.0
+    operation: Literal["fixed", "torque-law", "controlled"] = "fixed"
     discard: float = Field(default=0.0, ge=0)
     workers: int = Field(default=2, ge=1, le=1024)
     wind: Annotated[SerializeAsAny[WindSection], PlainValidator(wind_section)]
@@ -206,6 +209,15 @@ class Campaign(Section):
     reference: Reference | None = Reference()
     fatigue: Fatigue = Fatigue()
     log: Log = Log()
+
+    @model_validator(mode="after")
+    def _who_steers(self) -> Campaign:
+        if self.operation != "fixed" and "pitch" in self.model_fields_set:
+            raise problem(
+                f"operation {self.operation!r} makes the pitch itself; remove `pitch`, or use operation: fixed",
+                key="pitch",
+            )
+        return self
 
     @property
     def blade_pitch(self) -> float | PitchSeries:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
 TRIED_AT = (8.0, 10.5)  # m/s
+OPERATED_AT = (8.0, 18.0)  # m/s
 TRIED = 8  # runs
 LARGEST = 1.0  # s; no method of this program is used beyond
 
@@ -32,6 +33,9 @@ def stability_limit(turbine: Turbine, method: str, wind: float | None = None, pi
     growth = find_method(method).growth
     if growth(np.zeros(1, complex)) is None:
         return min(_tried_limit(turbine, method, v, pitch) for v in (TRIED_AT if wind is None else (wind,)))
+    if wind is None and turbine.layout.first_order:
+        # a controller pitches above rated: other modes than below
+        return min(stability_limit(turbine, method, v, pitch) for v in OPERATED_AT)
     wind = TRIED_AT[0] if wind is None else wind
     values = np.linalg.eigvals(linearised(turbine, wind, pitch))
     # the azimuth's free rotation has eigenvalue 0, which every method keeps

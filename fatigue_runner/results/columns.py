@@ -46,6 +46,7 @@ CASE = (
     Column("seed", "wind", "of the turbulence", kind="whole"),
     _text("wind_file", "wind", "file that the wind was read from"),
     Column("rotor_intensity", "statistics", "standard deviation over mean of the wind averaged over the rotor, in the counted time"),
+    _text("operation", "operation", "who steers: fixed, torque-law or controlled"),
     Column("pitch_deg", "operation", "blade pitch, positive to feather; empty where it varies in time", "deg"),
     _text("method", "integrator", "integration method"),
     Column("step", "integrator", "its time step", "s"),

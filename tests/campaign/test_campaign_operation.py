@@ -1,0 +1,60 @@
+"""A campaign of a turbine that operates: from YAML to loads under the controller, logged and resumed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fatigue_runner import run_campaign
+from fatigue_runner.campaign.plan import make_plan
+from fatigue_runner.errors import InputError
+from fatigue_runner.logbook import read_log
+
+CAMPAIGN = {
+    "name": "operation",
+    "duration": 8,
+    "discard": 2,
+    "operation": "controlled",
+    "wind": {"type": "turbulent", "speeds": [8, 18], "intensity": 0.1},
+    "integrators": [{"method": "rk4", "step": 0.05}],
+    "reference": {"method": "dop853", "step": 0.05},
+    "workers": 1,
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return run_campaign(CAMPAIGN, tmp_path_factory.mktemp("operation") / "run")
+
+
+def test_cases_run_above_rated_under_the_controller(results):
+    assert {row["status"] for row in results} == {"done"}
+    assert {row["operation"] for row in results} == {"controlled"} and results.rows[0]["pitch_deg"] is None
+    errors = [row["nrmse_max"] for row in results if not row["is_reference"]]
+    assert max(errors) < 0.01
+
+
+def test_logs_hold_the_controller_s_states(results):
+    log = read_log(results.out / "logs" / f"{results.rows[-1]['case_id']}.mcap")
+    names = [channel.name for channel in log.states]
+    assert names[-2:] == ["filtered_generator_speed", "speed_error_integral"] and log.state.shape[1] == 18
+    assert log.state[:, 16] == pytest.approx(122.9, rel=0.1)
+
+
+def test_a_second_run_keeps_what_is_finished(results):
+    again = run_campaign(CAMPAIGN, results.out)
+    load = "del_tower_base_fore_aft_moment_m4"
+    assert again.simulated == 0 and np.array_equal(again.column(load), results.column(load))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"operation": "controled"}, "operation: 'controled' is not known; did you mean 'controlled'"),
+        ({"pitch": 2.0}, "pitch: operation 'controlled' makes the pitch itself; remove `pitch`"),
+        ({"turbine": "t2b1i1cg"}, "turbine t2b1i1cg has no `control` section"),
+    ],
+)
+def test_operations_that_cannot_be_are_refused_in_one_sentence(change, message):
+    with pytest.raises(InputError, match=message):
+        make_plan({**CAMPAIGN, **change})
