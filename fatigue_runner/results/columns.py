@@ -41,6 +41,7 @@ CASE = (
     Column("vertical_shear", "wind", "mean linear vertical shear, change of the wind over R"),
     Column("horizontal_shear", "wind", "mean linear horizontal shear, change of the wind over R"),
     Column("shear_exponent", "wind", "power-law exponent alpha of the mean wind"),
+    Column("roughness_length", "wind", "of a logarithmic mean wind", "m"),
     Column("turbulence_intensity", "wind", "standard deviation over mean of the wind at a point at the hub; of a series, its own"),
     Column("harmonics", "wind", "azimuthal harmonics of the wind that the blades feel; 1: linear shears", kind="whole"),
     Column("seed", "wind", "of the turbulence", kind="whole"),

@@ -21,7 +21,13 @@ from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.checks import refuse_standstill
 from fatigue_runner.wind.fields.on_rotor import BOX_KEYS, FileWind, content, on_rotor
-from fatigue_runner.wind.mean_shear import NO_TURBINE, checked_harmonics, mean_profile, radial_rule
+from fatigue_runner.wind.mean_shear import (
+    NO_TURBINE,
+    checked_harmonics,
+    mean_profile,
+    one_profile,
+    radial_rule,
+)
 from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.source import WindSource
 from fatigue_runner.wind.words import told_strength
@@ -235,8 +241,7 @@ class FullFieldSection(WindSection):
 
     @model_validator(mode="after")
     def _one_profile(self) -> FullFieldSection:
-        if self.shear_exponent is not None and self.roughness_length is not None:
-            raise problem("stands beside shear_exponent; give one of the two", key="roughness_length")
+        one_profile(self)
         return self
 
     def realisations(self, site: Site) -> Iterator[Realisation]:

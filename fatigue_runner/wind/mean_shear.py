@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.section import problem
 from fatigue_runner.layout import MOST_HARMONICS, WIND
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
@@ -34,7 +35,10 @@ def checked_harmonics(what: str, harmonics: Any) -> int:
 
 
 def mean_profile(what: str, shear_exponent: Any, roughness_length: Any) -> Profile | None:
-    """The profile of a mean wind by its one parameter; None where neither is given. Raises InputError for both and for impossible ones."""
+    """The profile of a mean wind by its one parameter, alpha [-] or z_0 [m]; None where neither is given.
+
+    Raises InputError for both and for impossible ones.
+    """
     if shear_exponent is not None and roughness_length is not None:
         raise InputError(f"{what} has both shear_exponent and roughness_length; give one of the two")
     if roughness_length is not None:
@@ -42,17 +46,18 @@ def mean_profile(what: str, shear_exponent: Any, roughness_length: Any) -> Profi
     return None if shear_exponent is None else PowerLaw(shear_exponent)
 
 
-def checked_order(what: str, harmonics: Any, shear_exponent: Any, vertical_shear: float) -> int | None:
-    """M of a steady wind: as given, or the default where there is a power law. Raises InputError for what contradicts itself."""
-    if shear_exponent is None:
+def checked_order(what: str, harmonics: Any, profile: Profile | None, vertical_shear: float) -> int | None:
+    """M of a steady wind: as given, or the default where there is a profile. Raises InputError for what contradicts itself."""
+    if profile is None:
         if harmonics is not None and checked_harmonics(what, harmonics) > 1:
             raise InputError(
-                f"{what}: a linear shear has one harmonic, not {harmonics}; give shear_exponent for a power law"
+                f"{what}: a linear shear has one harmonic, not {harmonics}; give shear_exponent for a power law, "
+                "or roughness_length for a logarithmic profile"
             )
         return None
-    PowerLaw(shear_exponent)  # raises for an impossible one
     if vertical_shear:
-        raise InputError(f"{what} has both vertical_shear and shear_exponent; give one of the two")
+        given = "shear_exponent" if isinstance(profile, PowerLaw) else "roughness_length"
+        raise InputError(f"{what} has both vertical_shear and {given}; give one of the two")
     return DEFAULT_HARMONICS if harmonics is None else checked_harmonics(what, harmonics)
 
 
@@ -61,6 +66,12 @@ def radial_rule(rotor: Rotor) -> tuple[np.ndarray, np.ndarray, float]:
     """Radii (k,) [m], their shares (k,) in the blade-effective wind, and its mean radius over R."""
     rho, shares = RadialWeight(*rotor.weight).rule()
     return rho * rotor.radius, shares, float(shares @ rho)
+
+
+def one_profile(section: Any) -> None:
+    """For a section of a campaign with keys for both profiles: raises the problem where both are given."""
+    if {"shear_exponent", "roughness_length"} <= section.model_fields_set:
+        raise problem("stands beside shear_exponent; give one of the two", key="roughness_length")
 
 
 def mean_signals(profile: Profile, speed: float, rotor: Rotor, harmonics: int) -> np.ndarray:

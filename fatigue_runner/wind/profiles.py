@@ -31,6 +31,11 @@ class Profile(Protocol):
 
     def __hash__(self) -> int: ...
 
+    @property
+    def words(self) -> str:
+        """What it is, as a person reads it."""
+        ...
+
     def factor(self, height: np.ndarray, reference_height: float) -> np.ndarray:
         """Wind at `height` [m] over the wind at `reference_height` [m]."""
         ...
@@ -45,6 +50,10 @@ class PowerLaw:
     def __post_init__(self) -> None:
         number("shear exponent", self.exponent, at_least=-1.0, at_most=1.0, hint="IEC 61400-1 has 0.2")
 
+    @property
+    def words(self) -> str:
+        return f"power law, exponent {self.exponent:g}"
+
     def factor(self, height: np.ndarray, reference_height: float) -> np.ndarray:
         return (np.asarray(height) / reference_height) ** self.exponent
 
@@ -58,6 +67,10 @@ class Logarithmic:
     def __post_init__(self) -> None:
         hint = "0.03 is farmland, 0.0002 the sea"
         number("roughness length", self.roughness_length, above=0.0, unit=" m", hint=hint)
+
+    @property
+    def words(self) -> str:
+        return f"logarithmic, roughness length {self.roughness_length:g} m"
 
     def factor(self, height: np.ndarray, reference_height: float) -> np.ndarray:
         if not reference_height > self.roughness_length:

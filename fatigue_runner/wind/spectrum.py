@@ -91,6 +91,9 @@ def extreme_turbulence_sigma(turbulence: Any, wind: Any, mean_speed: float) -> f
     return c * turbulence_class(turbulence).reference_intensity * growth
 
 
+TURBULENCE_MODELS = {"ntm": "normal turbulence model", "etm": "extreme turbulence model"}
+
+
 def turbulence_scale(hub_height: float) -> float:
     """Lambda_1 [m]: 0.7 z below 60 m and 42 m above (IEC 61400-1:2005, equation 5)."""
     return min(0.7 * hub_height, 42.0)

@@ -23,36 +23,29 @@ point, 600 s at 10 m/s hold 88 % of sigma_1^2 (steps of 0.2 s lose less than 1e-
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from functools import cached_property, lru_cache
-from typing import Annotated, Any, Self
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
-from pydantic import Field, PlainValidator, field_validator, model_validator
 
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import problem
-from fatigue_runner.inputs.sweep import Sweep, expand
 from fatigue_runner.layout import WIND
-from fatigue_runner.naming import joined, speed_id, value_id
 from fatigue_runner.rotor import Rotor
-from fatigue_runner.wind import rotor_modes, spectrum
+from fatigue_runner.wind import spectrum
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.checks import number, refuse_standstill
+from fatigue_runner.wind.disc_turbulence import modal_series, modal_variances
 from fatigue_runner.wind.harmonic_series import RotorTurbulence
-from fatigue_runner.wind.mean_shear import NO_TURBINE, checked_harmonics, mean_signals
-from fatigue_runner.wind.profiles import PowerLaw
+from fatigue_runner.wind.mean_shear import NO_TURBINE, checked_harmonics, mean_profile, mean_signals
+from fatigue_runner.wind.profiles import PowerLaw, Profile
 from fatigue_runner.wind.radial_weight import RadialWeight
-from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.series import periodic_cubics
 from fatigue_runner.wind.source import WindSource
-from fatigue_runner.wind.streams import speed_stream, uniform
+from fatigue_runner.wind.strength import Strength
 from fatigue_runner.wind.words import told_strength
 
-# Order n of the azimuthal mode behind each signal, in the order of `channels.WIND_SIGNALS`. A signal's place
-# is its random stream, so signals added at the end leave the others' series as they are.
-MODES = (0, 1, 1)
+IEC_EXPONENT = 0.2
 AMPLITUDES = ("gaussian", "random-phase")
 
 
@@ -61,8 +54,10 @@ class TurbulentWind(WindSource):
     """IEC 61400-1 turbulence over the rotor: Kaimal spectrum, exponential coherence, one series per seed.
 
     `mean` is the hub-height mean V [m/s]; give either `intensity` = sigma_1/V [-] or `turbulence_class`
-    ("A+", "A", "B", "C": normal turbulence model). The series is periodic, `duration` [s] long, with a sample
-    every `time_step` [s]; halving it adds higher harmonics to the same series. `shear_exponent` is alpha;
+    ("A+", "A", "B", "C"): of the normal turbulence model, or with turbulence "etm" and a `wind_class` (I, II,
+    III) of the extreme one. The series is periodic, `duration` [s] long, with a sample
+    every `time_step` [s]; halving it adds higher harmonics to the same series. `shear_exponent` is alpha,
+    unless the mean wind is logarithmic with a `roughness_length` z_0 [m];
     `rotor_radius` and `hub_height` [m] are those of the turbine that it blows on, unless they are given (`on`;
     before there is a turbine: the NREL 5 MW's). Equal parameters give equal series on every
     machine, up to the FFT's rounding; one seed gives independent series at different mean wind speeds.
@@ -78,7 +73,7 @@ class TurbulentWind(WindSource):
     turbulence_class: str | None = None
     seed: int = 0
     duration: float = 600.0
-    shear_exponent: float = 0.2
+    shear_exponent: float = IEC_EXPONENT
     time_step: float = 0.2
     rotor_radius: float | None = None
     hub_height: float | None = None
@@ -87,18 +82,15 @@ class TurbulentWind(WindSource):
     harmonics: int = DEFAULT_HARMONICS
     spectrum_name: str = "kaimal"
     disc: Rotor | None = None
+    turbulence: str = "ntm"
+    wind_class: str | None = None
+    roughness_length: float | None = None
 
     def __post_init__(self) -> None:
         for key, bounds in BOUNDS.items():
             if key not in OPTIONAL or getattr(self, key) is not None:
                 object.__setattr__(self, key, number(f"turbulent wind: {key}", getattr(self, key), **bounds))
-        if (self.intensity is None) == (self.turbulence_class is None):
-            how = "neither" if self.intensity is None else "both"
-            raise InputError(
-                f"turbulent wind has {how} of intensity and turbulence_class; give exactly one of them"
-            )
-        if self.turbulence_class is not None:
-            spectrum.turbulence_class(self.turbulence_class)
+        _ = self._strength, self.profile  # both refuse what contradicts itself
         if isinstance(self.seed, bool) or not hasattr(self.seed, "__index__") or self.seed < 0:
             raise InputError(f"turbulent wind: seed must be a whole number, 0 or more, got {self.seed!r}")
         object.__setattr__(self, "seed", self.seed.__index__())
@@ -147,8 +139,22 @@ class TurbulentWind(WindSource):
         return self.disc or self._rotor_or(NO_TURBINE)
 
     @property
+    def _strength(self) -> Strength:
+        return Strength(self.intensity, self.turbulence_class, self.turbulence, self.wind_class)
+
+    @property
+    def profile(self) -> Profile:
+        """Of the mean wind."""
+        if self.roughness_length is None:
+            return PowerLaw(self.shear_exponent)
+        exponent = None if self.shear_exponent == IEC_EXPONENT else self.shear_exponent
+        profile = mean_profile("turbulent wind", exponent, self.roughness_length)
+        assert profile is not None
+        return profile
+
+    @property
     def name(self) -> str:
-        strength = f"ntm{self.turbulence_class}" if self.intensity is None else f"i{self.intensity:g}"
+        strength = self._strength.id if self.intensity is None else f"i{self.intensity:g}"
         return f"turbulent-{self.mean:g}-{strength}-seed{self.seed}"
 
     @property
@@ -157,27 +163,29 @@ class TurbulentWind(WindSource):
 
     @property
     def mean_shear(self) -> float:
-        """Linear vertical shear of the mean wind: alpha R/H, the power law's slope at the hub, or its blade-effective part."""
+        """Linear vertical shear of the mean wind: the profile's slope at the hub (alpha R/H), or its blade-effective part."""
         return float(self._mean[1])
 
     @cached_property
     def _mean(self) -> np.ndarray:
-        return mean_signals(PowerLaw(self.shear_exponent), self.mean, self.rotor, self.harmonics)
+        return mean_signals(self.profile, self.mean, self.rotor, self.harmonics)
 
     @property
     def sigma(self) -> float:
         """sigma_1 [m/s], the standard deviation of the longitudinal wind at a point."""
-        if self.intensity is None:
-            return spectrum.normal_turbulence_sigma(self.turbulence_class, self.mean)
-        return self.intensity * self.mean
+        return self._strength.sigma(self.mean)
 
     @property
     def parameters(self) -> dict[str, Any]:
         derived = {"vertical_shear": self.mean_shear, "horizontal_shear": 0.0}
         derived["turbulence_intensity"] = self.sigma / self.mean
-        given = {
-            f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("mean", "intensity", "disc")
+        left = {
+            "mean",
+            "intensity",
+            "disc",
+            "roughness_length" if self.roughness_length is None else "shear_exponent",
         }
+        given = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in left}
         return {**derived, **given, "rotor_radius": self.rotor.radius, "hub_height": self.rotor.hub_height}
 
     @property
@@ -196,22 +204,8 @@ class TurbulentWind(WindSource):
     @cached_property
     def modal_series(self) -> np.ndarray:
         """Amplitudes a_0, a_z, a_y of the fluctuation at the samples, (n, 3) [m/s]; of zero mean."""
-        variances = self._modal_variances
-        half = np.zeros((self.samples // 2 + 1, len(MODES)), complex)
-        for place, variance in enumerate(variances):
-            stream = (place, *self._stream)  # so that one seed is independent from speed to speed
-            power = variance
-            if self.amplitudes == "gaussian":
-                power = variance * -np.log1p(-uniform(self.seed, (*stream, 1), len(variance)))
-            phase = 2 * np.pi * uniform(self.seed, (*stream, 0), len(variance))
-            half[1:-1, place] = np.sqrt(power / 2) * np.exp(1j * phase)  # half of A = sqrt(2 * variance)
-        return np.fft.irfft(half, self.samples, axis=0, norm="forward") * self.sigma
-
-    @property
-    def _stream(self) -> tuple[int, ...]:
-        """Whole thousandths as they always were; any other speed by all its digits, so that no two share a stream."""
-        thousandths = round(1000 * self.mean)
-        return (thousandths,) if thousandths / 1000 == self.mean else speed_stream(self.mean)
+        random_phase = self.amplitudes == "random-phase"
+        return modal_series(self._modal_variances, self.mean, self.seed, random_phase) * self.sigma
 
     @property
     def _turbulence(self) -> RotorTurbulence:
@@ -232,12 +226,8 @@ class TurbulentWind(WindSource):
             "kaimal": "Kaimal spectrum and exponential",
             "von-karman": "von Karman spectrum and isotropic",
         }
-        model = (
-            ""
-            if self.intensity is not None
-            else f" of class {self.turbulence_class} (normal turbulence model)"
-        )
-        return f"IEC 61400-1 turbulence{model}, {spectra[self.spectrum_name]} coherence; mean wind: power law"
+        model = f"turbulence{self._strength.words}, {spectra[self.spectrum_name]} coherence"
+        return f"IEC 61400-1 {model}; mean wind: {self.profile.words}"
 
     @property
     def strength(self) -> str:
@@ -292,117 +282,14 @@ class TurbulentWind(WindSource):
         return self._coefficients[:n_cells]
 
 
-OPTIONAL = {"intensity", "rotor_radius", "hub_height"}
+OPTIONAL = {"intensity", "roughness_length", "rotor_radius", "hub_height"}
 BOUNDS: dict[str, dict[str, Any]] = {
     "mean": {"above": 0.0, "at_most": 100.0, "unit": " m/s"},
     "intensity": {"at_least": 0.0, "at_most": 1.0, "hint": "it is sigma_1 / mean: 0.14 for 14 %"},
     "duration": {"above": 0.0, "at_most": 86400.0, "unit": " s"},
     "time_step": {"at_least": 0.01, "at_most": 1.0, "unit": " s"},
     "shear_exponent": {"at_least": -1.0, "at_most": 1.0, "hint": "IEC 61400-1 has 0.2"},
+    "roughness_length": {"above": 0.0, "unit": " m"},
     "rotor_radius": {"above": 0.0, "unit": " m"},
     "hub_height": {"above": 0.0, "unit": " m"},
 }
-
-
-@lru_cache(maxsize=64)
-def modal_variances(
-    mean: float, rotor_radius: float, hub_height: float, samples: int, time_step: float, scaled: bool
-) -> np.ndarray:
-    """Diagonal of the spectral matrix per harmonic, (3, samples/2 - 1), as shares of sigma_1^2; read-only.
-
-    Harmonic k = 1, 2, ... has frequency k / (samples * time_step) and holds the bin half a step to either
-    side; the mean and the Nyquist frequency hold nothing. Cached: all seeds and intensities of one mean wind
-    speed share it.
-    """
-    scale, bin_width = spectrum.length_scale(hub_height), 1 / (samples * time_step)
-    harmonic = np.arange(1, samples // 2)
-    low, high = (harmonic - 0.5) * bin_width, (harmonic + 0.5) * bin_width
-    point = spectrum.kaimal_variance(low, high, mean, scale)
-    if scaled:
-        point = point / point.sum()
-    decay = spectrum.coherence_decay(harmonic * bin_width, mean, scale) * rotor_radius
-    admittances = {n: rotor_modes.admittance(n, decay) for n in set(MODES)}
-    variances = point * np.stack([admittances[n] for n in MODES])
-    variances.flags.writeable = False
-    return variances
-
-
-def _seeds(value: Any) -> int | list[int]:
-    if isinstance(value, list):
-        if not value or not all(type(seed) is int and seed >= 0 for seed in value):
-            raise problem(f"must be a count or a list of whole numbers, 0 or more; got {value!r:.60}")
-        return list(dict.fromkeys(value))
-    if type(value) is not int or not 1 <= value <= 999:
-        raise problem(f"must be a count from 1 to 999 or a list of seeds; got {value!r:.60}")
-    return value
-
-
-class TurbulentSection(WindSection):
-    """Every combination of speed and seed, in this order.
-
-    speeds             mean hub-height speeds [m/s]: a sweep
-    intensity          sigma_1 / mean speed at hub height [-], e.g. 0.14
-    turbulence_class   `A+`, `A`, `B` or `C`, the IEC normal turbulence model, instead of `intensity`
-    shear_exponent     power-law exponent alpha of the mean wind (default 0.2)
-    seeds              how many seeds per speed (default 1), 1, 2, ... at each, or a list; one seed is another turbulence at every speed
-    harmonics          azimuthal harmonics that the blades feel: 6 (default) hold 98 % of every load range, 1 is mean and linear shears
-    spectrum           `kaimal` (default) or `von-karman`
-    """
-
-    kind = "turbulent"
-
-    speeds: Sweep
-    intensity: float | None = Field(default=None, gt=0, le=1)
-    turbulence_class: str | None = None
-    shear_exponent: float | None = Field(default=None, ge=-1, le=1)
-    seeds: Annotated[int | list[int], PlainValidator(_seeds)] = 1
-    harmonics: int = Field(default=DEFAULT_HARMONICS, ge=0, le=16)
-    spectrum: str = "kaimal"
-
-    @field_validator("spectrum")
-    @classmethod
-    def _spectrum_exists(cls, name: str) -> str:
-        if name not in spectrum.SPECTRA:
-            raise problem(f"{name!r} is not known{did_you_mean(name, spectrum.SPECTRA)}")
-        return name
-
-    @field_validator("turbulence_class")
-    @classmethod
-    def _class_exists(cls, name: str | None) -> str | None:
-        if name is not None and name not in spectrum.TURBULENCE_CLASSES:
-            raise problem(f"{name!r} is not known{did_you_mean(name.upper(), spectrum.TURBULENCE_CLASSES)}")
-        return name
-
-    @model_validator(mode="after")
-    def _one_strength(self) -> TurbulentSection:
-        if (self.intensity is None) == (self.turbulence_class is None):
-            classes = ", ".join(spectrum.TURBULENCE_CLASSES)
-            raise problem(
-                f"of type 'turbulent' needs either `intensity` (e.g. 0.14) or `turbulence_class` ({classes})"
-            )
-        return self
-
-    def seeds_at(self, speed: float) -> list[int]:
-        """The seeds of the winds of a mean speed [m/s]: 1, 2, ..., or the list as it stands.
-
-        One seed is another turbulence at every speed (`streams.speed_stream`), so that more speeds or more seeds leave the others as
-        they are.
-        """
-        return self.seeds if isinstance(self.seeds, list) else list(range(1, self.seeds + 1))
-
-    def realisations(self, site: Site) -> Iterator[Realisation]:
-        strength: tuple[str, Any] = ("turbulence_class", self.turbulence_class)
-        label = f"ntm{self.turbulence_class}"
-        if self.intensity is not None:
-            strength, label = ("intensity", self.intensity), f"ti{value_id(self.intensity)}"
-        shear = () if self.shear_exponent is None else (("shear_exponent", self.shear_exponent),)
-        more = (("harmonics", self.harmonics), ("spectrum_name", self.spectrum))
-        for speed, piece in expand(self.speeds):
-            for seed in self.seeds_at(speed):
-                yield Realisation(
-                    joined(speed_id(speed), label, f"s{seed}"),
-                    self.kind,
-                    (("mean", speed), strength, ("seed", seed), ("duration", site.duration), *shear, *more),
-                    ("speeds", piece),
-                    speed,
-                )

@@ -14,6 +14,8 @@ from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.lanes import evaluate
 from fatigue_runner.wind import ConstantWind, FullFieldWind, TurbulentWind
 from fatigue_runner.wind.azimuth import wind_at
+from fatigue_runner.wind.mean_shear import mean_signals
+from fatigue_runner.wind.profiles import Logarithmic
 
 
 @pytest.fixture(scope="module")
@@ -85,12 +87,29 @@ def test_the_power_law_has_its_harmonics_and_the_same_blade_effective_slope(turb
     assert not signals[4::2].any()
 
 
+def test_a_logarithmic_profile_has_its_own_harmonics(turbine):
+    wind = ConstantWind(8.0, roughness_length=0.03).on(turbine.rotor)
+    steady = mean_signals(Logarithmic(0.03), 8.0, turbine.rotor, 6)
+    assert wind.at([0.0])[0] == pytest.approx(steady) and steady[5] < 0 < steady[7]
+    # at the hub its slope is 1 / (h ln(h / z_0)): a power law of exponent 1 / ln(h / z_0), but more curved
+    similar = (
+        ConstantWind(8.0, shear_exponent=1 / np.log(turbine.hub_height / 0.03)).on(turbine.rotor).at([0.0])[0]
+    )
+    assert steady[1] == pytest.approx(similar[1], rel=0.03) and steady[5] < similar[5]
+    linear = ConstantWind(8.0, roughness_length=0.03, harmonics=1).on(turbine.rotor).at([0.0])[0]
+    assert linear[1] == pytest.approx(
+        turbine.rotor.radius / turbine.hub_height / np.log(turbine.hub_height / 0.03), rel=1e-5
+    )
+
+
 def test_linear_shear_has_one_harmonic_and_says_so():
     assert ConstantWind(8.0, 0.1).harmonics == 1 and ConstantWind(8.0, 0.1).at([0.0]).shape == (1, 3)
     with pytest.raises(InputError, match="a linear shear has one harmonic, not 3; give shear_exponent"):
         ConstantWind(8.0, 0.1, harmonics=3)
     with pytest.raises(InputError, match="both vertical_shear and shear_exponent"):
         ConstantWind(8.0, 0.1, shear_exponent=0.2)
+    with pytest.raises(InputError, match="both shear_exponent and roughness_length"):
+        ConstantWind(8.0, shear_exponent=0.2, roughness_length=0.03)
 
 
 @pytest.mark.parametrize("harmonics", [-1, 2.5, 99, True])

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.wind import TurbulentWind, rotor_modes, spectrum
-from fatigue_runner.wind.turbulence import AMPLITUDES, modal_variances, uniform
+from fatigue_runner.wind.disc_turbulence import modal_variances
+from fatigue_runner.wind.streams import uniform
+from fatigue_runner.wind.turbulence import AMPLITUDES
 
 R, H = 63.0, 90.0
 

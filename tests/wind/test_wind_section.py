@@ -18,8 +18,15 @@ from fatigue_runner.naming import speed_id
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import SOURCES, ConstantWind, TurbulentWind
+from fatigue_runner.wind.mean_shear import mean_signals
+from fatigue_runner.wind.profiles import Logarithmic
 from fatigue_runner.wind.section import SECTIONS, Realisation, Site, WindSection
-from fatigue_runner.wind.spectrum import TURBULENCE_CLASSES
+from fatigue_runner.wind.spectrum import (
+    TURBULENCE_CLASSES,
+    WIND_CLASSES,
+    extreme_turbulence_sigma,
+    normal_turbulence_sigma,
+)
 
 LARGE = Rotor(120.0, 150.0)
 
@@ -103,6 +110,73 @@ def test_every_turbulence_class_of_the_source_works_in_a_campaign(name):
     (found,) = winds_of({"type": "turbulent", "speeds": 8, "turbulence_class": name})
     assert found.build(LARGE).sigma == TurbulentWind(8.0, turbulence_class=name).sigma
     assert found.id == f"v08.00_ntm{name}_s1"
+
+
+@pytest.mark.parametrize("wind_class", WIND_CLASSES)
+def test_extreme_turbulence_is_that_of_its_wind_class(wind_class):
+    wind = {
+        "type": "turbulent",
+        "speeds": 12,
+        "turbulence": "etm",
+        "turbulence_class": "B",
+        "wind_class": wind_class,
+    }
+    (found,) = winds_of(wind)
+    blowing = found.build(LARGE)
+    assert (
+        blowing.sigma
+        == extreme_turbulence_sigma("B", wind_class, 12.0)
+        > 1.2 * normal_turbulence_sigma("B", 12.0)
+    )
+    assert found.id == f"v12.00_etmB-{wind_class}_s1"
+    assert "extreme turbulence model" in blowing.description
+    # one seed is the same turbulence, only stronger
+    normal = TurbulentWind(12.0, turbulence_class="B", seed=1, duration=20.0).on(LARGE)
+    assert blowing.harmonic_series / blowing.sigma == pytest.approx(normal.harmonic_series / normal.sigma)
+
+
+@pytest.mark.parametrize(
+    ("wind", "message"),
+    [
+        (
+            {"turbulence": "etm", "turbulence_class": "B"},
+            "wind.turbulence: etm needs a wind_class (I, II, III)",
+        ),
+        (
+            {"turbulence": "emt", "turbulence_class": "B"},
+            "wind.turbulence: 'emt' is not known; did you mean 'etm'?",
+        ),
+        (
+            {"turbulence": "etm", "turbulence_class": "B", "wind_class": "IV"},
+            "wind.wind_class: 'IV' is not known; did you mean 'I'?",
+        ),
+        ({"turbulence_class": "B", "wind_class": "I"}, "means nothing for ntm; leave it out"),
+        ({"turbulence": "etm", "intensity": 0.2}, "etm says how strong it is; give a turbulence_class"),
+        (
+            {"intensity": 0.1, "shear_exponent": 0.2, "roughness_length": 0.03},
+            "wind.roughness_length: stands beside shear_exponent",
+        ),
+        ({"intensity": 0.1, "roughness_length": -1.0}, "wind.roughness_length must be above 0"),
+        (
+            {"intensity": 0.1, "spectrum": "kaimall"},
+            "wind.spectrum: 'kaimall' is not known; did you mean 'kaimal'?",
+        ),
+    ],
+)
+def test_turbulence_that_contradicts_itself_is_refused(wind, message):
+    with pytest.raises(InputError) as caught:
+        parse({"type": "turbulent", "speeds": 12, **wind})
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", [{"type": "constant"}, {"type": "turbulent", "intensity": 0.1}])
+def test_a_logarithmic_profile_blows_in_every_kind_of_wind(kind):
+    (found,) = winds_of({"speeds": 12, "roughness_length": 0.03, **kind})
+    blowing = found.build(LARGE)
+    assert blowing.parameters["roughness_length"] == 0.03 and "shear_exponent" not in blowing.parameters
+    steady = mean_signals(Logarithmic(0.03), 12.0, LARGE, 6)
+    # the turbulence's amplitudes have no mean
+    assert blowing.at(np.arange(0, 20, 0.2))[:, 3:].mean(axis=0) == pytest.approx(steady[3:], abs=1e-9)
 
 
 def test_an_unknown_turbulence_class_is_refused():
