@@ -5,7 +5,7 @@ Moments are about the blade-root and tower-base axes as OpenFAST's RootMyb/RootM
 
 from __future__ import annotations
 
-from fatigue_runner.layout import MOST_HARMONICS, T2B1I1CG, harmonic_channels
+from fatigue_runner.layout import HARMONICS, T2B1I1CG
 from fatigue_runner.layout import Channel as Channel
 
 STATES = T2B1I1CG.states
@@ -13,7 +13,7 @@ GROWING = tuple(
     c.name for c in STATES[T2B1I1CG.rotor : T2B1I1CG.freedoms]
 )  # azimuths, which have no extremes
 WIND_SIGNALS = T2B1I1CG.wind
-WIND_HARMONICS = harmonic_channels(MOST_HARMONICS)  # what a wind of more than one harmonic has beside them
+WIND_HARMONICS = HARMONICS  # what a wind of more than one harmonic has beside them
 
 LOADS = (
     Channel("tower_base_fore_aft_moment", "N.m", "tower-base fore-aft moment", "kN·m", 1e-3),

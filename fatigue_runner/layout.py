@@ -9,8 +9,11 @@ A new state or signal is one entry here, or one entry of a layout that is derive
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
+
+from fatigue_runner.errors import InputError
 
 BLADES = 3
 
@@ -169,6 +172,27 @@ class Layout:
     def _rows(self) -> dict[str, int]:
         return {name: i for i, name in enumerate(self.names)}
 
+    # --- the wind ---
+
+    def wind_rows(self, signals: Iterable[Channel]) -> list[int]:
+        """Row that the kernels read each of a wind's signals from: azimuthal harmonics stand behind the layout's own.
+
+        Raises InputError for a signal that these equations do not know.
+        """
+        own = {c.name: row for row, c in enumerate(self.wind)}
+        own |= {name: len(self.wind) + i for name, i in _HARMONIC_PLACES.items()}
+        names = [c.name for c in signals]
+        if unknown := [name for name in names if name not in own]:
+            raise InputError(
+                f"the wind has a signal {unknown[0]!r} that the equations do not know; they know {', '.join(c.name for c in self.wind)} "
+                "and azimuthal harmonics"
+            )
+        return [own[name] for name in names]
+
+    def wind_size(self, signals: Iterable[Channel]) -> int:
+        """Rows of the wind that the kernels take: the layout's own, and harmonics filled up to whole triples."""
+        return len(self.wind) + 2 * TRIPLE * triples(signals)
+
     # --- relative coordinates: what forces depend on, besides the azimuth ---
 
     @property
@@ -224,10 +248,13 @@ def harmonic_channels(harmonics: int) -> tuple[Channel, ...]:
     )
 
 
-def kernel_rows(signals: int) -> int:
-    """Rows of the wind that a kernel takes for that many signals: the harmonics filled up to whole triples."""
-    pairs = (signals - len(WIND)) // 2
-    return len(WIND) + 2 * TRIPLE * -(-pairs // TRIPLE)
+HARMONICS = harmonic_channels(MOST_HARMONICS)
+_HARMONIC_PLACES = {c.name: i for i, c in enumerate(HARMONICS)}
+
+
+def triples(signals: Iterable[Channel]) -> int:
+    """Threes of azimuthal harmonics that hold those among a wind's signals."""
+    return -(-sum(c.name in _HARMONIC_PLACES for c in signals) // (2 * TRIPLE))
 
 
 PITCH = Channel("pitch", "rad", "blade pitch", "deg", DEGREES)

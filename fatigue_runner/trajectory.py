@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fatigue_runner.layout import T2B1I1CG, Channel
+from fatigue_runner.channels import STATES, Channel, wind_channels
 
 
 @dataclass
@@ -14,7 +14,7 @@ class Trajectory:
     """One case, sampled at the output times.
 
     time (n,) [s]; state (n, k) in the order of `states`, which are `channels.STATES` and the first-order states of a controller, say,
-    behind them; wind (n, 3) in the order of `channels.WIND_SIGNALS`;
+    behind them; wind (n, k) in the order of `winds`: `wind_signals` where they are given, else `channels.wind_channels`;
     loads {channel: (n,)} SI. The status arrays have one entry per output interval, (n-1,): `accepted` is False where any
     step in the interval fell back, `discrepancy` and `threshold` are the hybrid's norms (NaN where there is no test),
     `local_error` the embedded error estimate's largest scaled component (NaN for methods without one).
@@ -35,9 +35,15 @@ class Trajectory:
     clamped_lookups: int = 0
     wall_time: float = 0.0
     diverged_at: float | None = None
-    states: tuple[Channel, ...] = T2B1I1CG.states
+    states: tuple[Channel, ...] = STATES
+    wind_signals: tuple[Channel, ...] | None = None
     pitch: np.ndarray = field(default_factory=lambda: np.empty(0))
     control: dict[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def winds(self) -> tuple[Channel, ...]:
+        """What the columns of `wind` are."""
+        return self.wind_signals or wind_channels(self.wind.shape[1] if np.ndim(self.wind) == 2 else 0)
 
     @property
     def duration(self) -> float:

@@ -28,8 +28,8 @@ def check(resolved: Resolved) -> list[str]:
 
 def _check_logged_channels(resolved: Resolved) -> None:
     """Harmonics beyond those of the winds: the spec knows the names, only the winds how many there are."""
-    there = min((wind.source.signals for wind in resolved.winds), default=0)
-    missing = {c.name for c in channels.WIND_HARMONICS} - set(channels.wind_names(there))
+    everywhere = set(channels.WIND_HARMONICS).intersection(*(wind.source.channels for wind in resolved.winds))
+    missing = {c.name for c in channels.WIND_HARMONICS if c not in everywhere}
     for index, name in enumerate(resolved.campaign.log.channels or ()):
         if name in missing:
             harmonics = min(wind.source.harmonics for wind in resolved.winds)

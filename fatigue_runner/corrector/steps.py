@@ -22,6 +22,7 @@ from fatigue_runner.corrector.coordinates import (
     relative_to_fixed,
     turn_of,
 )
+from fatigue_runner.layout import WIND
 
 if TYPE_CHECKING:
     from fatigue_runner.trajectory import Trajectory
@@ -112,6 +113,6 @@ def rows(turbine: Turbine, x: Array, wind: Array, parts: list[Array], turn: Turn
     state = relative_to_fixed(layout, relative(layout, x, turbine.gearbox_ratio), turn)
     blown = wind.copy()
     # the wind that the shears add at the rotor's edge; other signals as they are
-    blown[:, :, 1:3] *= wind[:, :, :1]
+    blown[:, :, 1 : len(WIND)] *= wind[:, :, :1]
     earlier = [parts_to_fixed(layout, part, turn) for part in parts]
     return np.concatenate([np.ones((len(x), 1)), state, blown.reshape(len(x), -1), *earlier], axis=1)

@@ -110,7 +110,7 @@ def run_block(block: Block, winds: Sequence[WindSource], initial: Array) -> list
     control: Any = None
     if isinstance(block.pitch, PitchSeries):
         control = PitchCells(*block.pitch.cells(block.turbine.pitch_range, block.steps * block.step))
-    cell_duration, cells = stack_cells(winds, end)
+    cell_duration, cells = stack_cells(winds, end, layout)
     groups = to_groups(np.ascontiguousarray(initial.T))
     # one group's cells: (n_cells, 4, signals * LANES)
     blocks = to_groups(cells.reshape(-1, len(winds))).reshape(len(groups), len(cells), 4, -1)
@@ -190,7 +190,7 @@ def _trajectory(
         time=time_points,
         state=own,
         wind=signals,
-        loads=turbine.loads(own, signals, 0.0 if commanded else pitch),
+        loads=turbine.loads(own, signals, 0.0 if commanded else pitch, wind.channels),
         accepted=out.accepted[: n - 1, lane].copy(),
         discrepancy=np.full(n - 1, np.nan) if np.isnan(limit) else distance,
         threshold=np.full(n - 1, limit),
@@ -201,6 +201,7 @@ def _trajectory(
         wall_time=group.wall / lanes,
         diverged_at=diverged_at if diverged_at >= 0 else None,
         states=block.data.model.layout.states,
+        wind_signals=wind.channels,
         pitch=commanded["pitch"] if commanded else np.broadcast_to(pitch, n).astype(float),
         control={name: own[:, layout.row(name)].copy() for name in layout.names[2 * layout.freedoms :]},
     )

@@ -14,10 +14,12 @@ from numba.extending import overload
 
 from fatigue_runner.compiled import LEAN, njit
 from fatigue_runner.integrators.multi_blade import STATE_ROW
+from fatigue_runner.layout import WIND
 from fatigue_runner.turbine.lane_code import LANES
 from fatigue_runner.turbine.model import constant, first_order, freedoms, rotor, wind_signals
 
 SIN60 = math.sqrt(0.75)
+EVERY_WIND = len(WIND)  # speed and two shears; signals of a layout's own follow
 
 relative_rows = constant(lambda layout: layout.relative_size)
 part_size = constant(lambda layout: layout.freedoms + len(layout.first_order))
@@ -106,7 +108,7 @@ def wind_rows(model, p, rows, to):
         rows[to * LANES + j] = v
         rows[(to + 1) * LANES + j] = v * p[LANES + j]
         rows[(to + 2) * LANES + j] = v * p[2 * LANES + j]
-    for m in range(3 * LANES, wind_signals(model) * LANES):
+    for m in range(EVERY_WIND * LANES, wind_signals(model) * LANES):
         rows[to * LANES + m] = p[m]
 
 

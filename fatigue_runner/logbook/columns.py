@@ -15,7 +15,6 @@ from fatigue_runner.trajectory import Trajectory
 # Status fields that every trajectory has, and those that only some runs know.
 STATUS_ARRAYS = ("accepted", "discrepancy", "threshold", "local_error")
 EXTRA_STATUS = ("reference_error", "clamped_lookups")
-WIND = (*channels.WIND_NAMES, *(c.name for c in channels.WIND_HARMONICS))
 
 
 def _table(values: np.ndarray, names: Sequence[str], what: str, rows: int) -> dict[str, np.ndarray]:
@@ -30,12 +29,14 @@ def _table(values: np.ndarray, names: Sequence[str], what: str, rows: int) -> di
     return dict(zip(names, values.T, strict=False))
 
 
-def _wind(values: np.ndarray, rows: int) -> dict[str, np.ndarray]:
-    """Columns of a (rows, 3 + 2 M) wind by name; a pair's sine is never without its cosine."""
-    count = np.shape(values)[-1] if np.ndim(values) == 2 else 0
-    found = _table(values, WIND, "wind", rows)
-    if count > len(channels.WIND_NAMES) and (count - len(channels.WIND_NAMES)) % 2:
-        raise LogError(f"the wind to log has {count} columns; it must be 3 + 2 M for M azimuthal harmonics")
+def _wind(block: Trajectory, rows: int) -> dict[str, np.ndarray]:
+    """Columns of the wind by name; a pair's sine is never without its cosine."""
+    names = [c.name for c in (block.wind_signals or (*channels.WIND_SIGNALS, *channels.WIND_HARMONICS))]
+    found = _table(block.wind, names, "wind", rows)
+    if sum(c.name in found for c in channels.WIND_HARMONICS) % 2:
+        raise LogError(
+            f"the wind to log has {len(found)} columns; it must be 3 + 2 M for M azimuthal harmonics"
+        )
     return found
 
 
@@ -87,7 +88,7 @@ def columns(
         "status": _status(block, extra or {}, rows, first_row),
         "state": _table(block.state, [c.name for c in block.states], "state", rows),
         "loads": loads,
-        "wind": _wind(block.wind, rows),
+        "wind": _wind(block, rows),
     }
     return {key: {"time": time, **fields} for key, fields in found.items() if fields}
 
@@ -96,13 +97,13 @@ def topics_of(
     available: Mapping[str, Mapping[str, np.ndarray]],
     keys: Iterable[str] | None,
     names: Iterable[str] | None,
-    states: Sequence[channels.Channel] = channels.STATES,
+    run: Trajectory,
 ) -> tuple[Topic, ...]:
     """The topics, in row order and with the fields that are available, that a log keeps.
 
     keys: topics asked for, None for what is there; names: channels asked for, None for all (status is not a
-    matter of channels); states: of the run, those of the turbine first. Raises LogError for a topic or channel
-    that is asked for and not there.
+    matter of channels); run: whose states and wind signals they are. Raises LogError for a topic or channel that
+    is asked for and not there.
     """
     kept = [t for t in select_topics(keys) if keys is not None or t.key in available]
     if names is not None:
@@ -113,6 +114,7 @@ def topics_of(
                 raise LogError(
                     f"cannot log channel {name!r}, the run does not have it{did_you_mean(name, there)}"
                 )
+    own = {"state": run.states, "wind": run.winds}
     found = []
     for t in kept:
         if t.key not in available:
@@ -121,7 +123,7 @@ def topics_of(
         if names is not None and t.key != "status":
             fields &= set(names)
         if fields - {"time"}:
-            found.append((t.of(states) if t.key == "state" else t).only(fields))
+            found.append((t.of(own[t.key]) if t.open else t).only(fields))
     if [t.key for t in found] == ["status"]:
         raise LogError(
             "cannot log the status alone: it has no row for the first time; add state, loads or wind"

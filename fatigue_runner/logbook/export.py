@@ -32,7 +32,7 @@ def table(log: Log) -> Columns:
         columns |= dict(zip((c.name for c in log.states), log.state.T, strict=True))
     columns |= log.loads
     if len(log.wind):
-        columns |= dict(zip(channels.wind_names(log.wind.shape[1]), log.wind.T, strict=True))
+        columns |= dict(zip((c.name for c in log.winds), log.wind.T, strict=True))
     for f in STATUS_FIELDS[1:]:
         values = getattr(log, "clamped_lookups_at" if f.name == "clamped_lookups" else f.name)
         if values.size:
@@ -43,7 +43,8 @@ def table(log: Log) -> Columns:
 def units_of(log: Log) -> dict[str, str]:
     """SI units of the columns of `table`."""
     status = {f.name: f.unit for f in STATUS_FIELDS}
-    return status | {n: c.unit for n, c in channels.BY_NAME.items()} | {c.name: c.unit for c in log.states}
+    known = {c.name: c.unit for c in (*channels.BY_NAME.values(), *log.states, *log.winds)}
+    return status | known
 
 
 def choose(columns: Columns, patterns: Iterable[str] | None) -> Columns:

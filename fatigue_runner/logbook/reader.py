@@ -29,8 +29,8 @@ class Log(Trajectory):
     """A trajectory that was read from a log, with what the log says about it.
 
     Topics that the log does not hold are empty arrays; states of the turbine and wind signals that it does not
-    hold are NaN. `states` goes on with the further ones that it holds, wind (n, 3 + 2 M) up to its highest
-    azimuthal harmonic. reference_error (n-1,), clamped_lookups_at (n-1,) counts per interval: empty where the
+    hold are NaN. `states` and `winds` go on with the further ones that it holds, wind up to its highest azimuthal
+    harmonic. reference_error (n-1,), clamped_lookups_at (n-1,) counts per interval: empty where the
     log does not hold them. run, result, units: metadata; complete: the whole run is there; lost: what was
     damaged, empty for a whole file.
     """
@@ -162,12 +162,14 @@ def assemble(tables: Tables, rows: int, intervals: int, contents: Contents) -> L
     time = clock["time"] if "time" in clock else clock["_log_time"] / 1e9
     loads = tables.get("loads", {})
     status = tables.get("status", {})
-    states = _states(tables, contents.metadata.get("units", {}))
+    units = contents.metadata.get("units", {})
+    states, winds = (*channels.STATES, *_own("state", tables, units)), _winds(tables, units)
     log = Log(
         time[:rows],
         matrix("state", [c.name for c in states]),
-        matrix("wind", _wind_names(tables)),
+        matrix("wind", [c.name for c in winds]),
         states=states,
+        wind_signals=winds,
     )
     log.loads = {k: v[:rows] for k, v in loads.items() if k != "time" and not k.startswith("_")}
     for name in STATUS_ARRAYS:
@@ -180,22 +182,22 @@ def assemble(tables: Tables, rows: int, intervals: int, contents: Contents) -> L
     return log
 
 
-def _states(tables: Tables, units: Mapping[str, str]) -> tuple[channels.Channel, ...]:
-    """The turbine's states and the further ones that the log holds, which are read in SI."""
-    own = TOPICS["state"].further(tables.get("state", ()))
-    known = channels.BY_NAME
-    units = {name: units.get(name, "-") for name in own}
-    return (
-        *channels.STATES,
-        *(known.get(n) or channels.Channel(n, units[n], n.replace("_", " "), units[n]) for n in own),
-    )
+def _own(key: str, tables: Tables, units: Mapping[str, str]) -> tuple[channels.Channel, ...]:
+    """The further signals that the log holds in an open topic, which are read in SI where nobody else knows them."""
+
+    def channel(name: str) -> channels.Channel:
+        unit = units.get(name, "-")
+        return channels.BY_NAME.get(name) or channels.Channel(name, unit, name.replace("_", " "), unit)
+
+    return tuple(channel(name) for name in TOPICS[key].further(tables.get(key, ())))
 
 
-def _wind_names(tables: Tables) -> tuple[str, ...]:
+def _winds(tables: Tables, units: Mapping[str, str]) -> tuple[channels.Channel, ...]:
     """The signals up to the highest harmonic that the log holds."""
     held = tables.get("wind", {})
     pairs = [place // 2 + 1 for place, c in enumerate(channels.WIND_HARMONICS) if c.name in held]
-    return channels.wind_names(len(channels.WIND_NAMES) + 2 * max(pairs, default=0))
+    harmonics = channels.WIND_HARMONICS[: 2 * max(pairs, default=0)]
+    return (*channels.WIND_SIGNALS, *_own("wind", tables, units), *harmonics)
 
 
 def _take_metadata(log: Log, contents: Contents) -> None:

@@ -9,7 +9,7 @@ but absent double as 0.0, which nobody could tell from a measurement.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 
@@ -79,8 +79,8 @@ class Topic:
         wanted = {"time", *names}
         return replace(self, fields=tuple(f for f in self.fields if f.name in wanted))
 
-    def of(self, signals: Iterable[channels.Channel]) -> Topic:
-        """The same topic of all these signals, which begin with its own."""
+    def of(self, signals: Sequence[channels.Channel]) -> Topic:
+        """The same topic of these signals, which begin with its own and may end with the wind's harmonics."""
         return replace(self, fields=_fields(signals))
 
     def further(self, names: Iterable[str]) -> tuple[str, ...]:
@@ -93,8 +93,15 @@ class Topic:
 _TIME = Field("time", 1, "double", "s")
 
 
-def _fields(signals: Iterable[channels.Channel]) -> tuple[Field, ...]:
-    return (_TIME, *(Field(c.name, i + 2, "double", c.unit) for i, c in enumerate(signals)))
+# c_1, s_1, c_2, ...: beyond the numbers that further signals of the whole rotor may get
+FIRST_HARMONIC = 101
+
+
+def _fields(signals: Sequence[channels.Channel]) -> tuple[Field, ...]:
+    own = [c for c in signals if c not in channels.WIND_HARMONICS]
+    numbers = {c.name: i + 2 for i, c in enumerate(own)}
+    numbers |= {c.name: FIRST_HARMONIC + i for i, c in enumerate(channels.WIND_HARMONICS)}
+    return (_TIME, *(Field(c.name, numbers[c.name], "double", c.unit) for c in signals))
 
 
 STATUS_FIELDS = (
@@ -107,18 +114,14 @@ STATUS_FIELDS = (
     Field("clamped_lookups", 7, "fixed32"),
 )
 
-# c_1, s_1, c_2, ...: beyond the numbers that further signals of the whole rotor may get
-FIRST_HARMONIC = 101
-_HARMONICS = tuple(
-    Field(c.name, FIRST_HARMONIC + i, "double", c.unit) for i, c in enumerate(channels.WIND_HARMONICS)
-)
-
 # In the order of a row: the status of the interval that ends at a time comes before the state at that time.
 TOPICS: dict[str, Topic] = {
     "status": Topic("status", "/solver/status", "Status", 3, STATUS_FIELDS),
     "state": Topic("state", "/turbine/state", "State", 1, _fields(channels.STATES), open=True),
     "loads": Topic("loads", "/turbine/loads", "Loads", 2, _fields(channels.LOADS)),
-    "wind": Topic("wind", "/wind", "Wind", 4, (*_fields(channels.WIND_SIGNALS), *_HARMONICS)),
+    "wind": Topic(
+        "wind", "/wind", "Wind", 4, _fields((*channels.WIND_SIGNALS, *channels.WIND_HARMONICS)), open=True
+    ),
 }
 BY_TOPIC = {t.name: t for t in TOPICS.values()}
 BY_SCHEMA = {t.schema_name: t for t in TOPICS.values()}

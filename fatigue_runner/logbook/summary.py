@@ -108,9 +108,7 @@ def extremes(log: Log) -> list[Extreme]:
     """Extremes of every channel in the log, loads first; without the azimuths, which only grow."""
     columns = dict(log.loads)
     columns |= dict(zip((c.name for c in log.states), log.state.T, strict=True)) if len(log.state) else {}
-    columns |= (
-        dict(zip(channels.wind_names(log.wind.shape[1]), log.wind.T, strict=True)) if len(log.wind) else {}
-    )
+    columns |= dict(zip((c.name for c in log.winds), log.wind.T, strict=True)) if len(log.wind) else {}
     found = []
     for name, values in columns.items():
         unit = channels.BY_NAME[name].unit if name in channels.BY_NAME else log.units.get(name, "")

@@ -129,8 +129,7 @@ class LogWriter:
         extra = {"reference_error": reference_error, "clamped_lookups": clamped_lookups}
         values = columns(block, extra, self.rows)
         if self._layout is None:
-            kept = topics_of(values, self._topic_keys, self._channels, block.states)
-            self._begin(layout_for(kept))
+            self._begin(layout_for(topics_of(values, self._topic_keys, self._channels, block)))
         self._refuse_missing(values)
         with self._writing():
             self._write_rows(values, log_time)

@@ -40,6 +40,7 @@ AZIMUTHS = 24  # of one revolution; three blades and up to the second harmonic r
 
 # rows of T2B1i1cG by what they are here; first-order states follow them where a turbine has any
 _FREEDOMS = T2B1I1CG.freedoms
+_FORE_AFT, _SIDE_SIDE = T2B1I1CG.row("tower_fore_aft"), T2B1I1CG.row("tower_side_side")
 _FLAP = T2B1I1CG.blade_sets[0]
 _FLAPS, _FLAP_RATES = slice(_FLAP, _FLAP + 3), slice(_FREEDOMS + _FLAP, _FREEDOMS + _FLAP + 3)
 _EDGE = T2B1I1CG.row("edge")
@@ -54,7 +55,7 @@ def _states(layout: Layout, unknown: Array, azimuths: Array, ratio: float) -> Ar
     a, s, f, fc, fs, e, twist, speed = unknown[:_UNKNOWNS]
     x = np.zeros((layout.size, len(azimuths)))
     psi = azimuths + np.arange(3)[:, None] * 2 * np.pi / 3
-    x[0], x[1], x[_EDGE] = a, s, e
+    x[_FORE_AFT], x[_SIDE_SIDE], x[_EDGE] = a, s, e
     x[_FLAPS] = f + fc * np.cos(psi) + fs * np.sin(psi)
     x[_FLAP_RATES] = speed * (fs * np.cos(psi) - fc * np.sin(psi))
     x[_ROTOR], x[_GENERATOR] = azimuths, ratio * (azimuths - twist)
@@ -90,7 +91,8 @@ def _steady(
         harmonics = (flap * np.cos(psi)).mean(), (flap * np.sin(psi)).mean()
         drive = mean[_ROTOR], mean[_GENERATOR] / ratio
         more = mean[_FREEDOMS:] / own
-        return np.array([mean[0], mean[1], flap.mean(), *harmonics, mean[_EDGE] / 50, *drive, *more])
+        tower = mean[_FORE_AFT], mean[_SIDE_SIDE]
+        return np.array([*tower, flap.mean(), *harmonics, mean[_EDGE] / 50, *drive, *more])
 
     guesses, slowest = turbine.guesses(wind)
     for speed, states in guesses:
@@ -190,7 +192,8 @@ def _names(shares: list[Array]) -> list[str]:
         "flap cyclic",
         "drivetrain and collective edge",
     )
-    groups = [[0], [1], [_FLAP], [_FLAP + 1, _FLAP + 2], [], [_EDGE, _ROTOR, _GENERATOR]]
+    cyclic, drive = [_FLAP + 1, _FLAP + 2], [_EDGE, _ROTOR, _GENERATOR]
+    groups = [[_FORE_AFT], [_SIDE_SIDE], [_FLAP], cyclic, [], drive]
     raw = []
     for share in shares:
         raw.append(kinds[int(np.argmax([sum(share[i] for i in g) for g in groups]))])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.control import baseline
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.layout import WIND, Layout, kernel_rows
+from fatigue_runner.layout import HARMONICS, WIND, Channel, Layout
 from fatigue_runner.rotor import SQUARE, Rotor
 from fatigue_runner.turbine.dynamics import BASELINE_CONTROLLED, UNCONTROLLED, Dynamics
 from fatigue_runner.turbine.file import Control, check_turbine, mapping_source, read_turbine_file
@@ -178,21 +178,30 @@ class Turbine:
             return evaluate(self.pitched_kernel_data(), columns, p, signals(angle))[0].reshape(x.shape)
         return evaluate(self.kernel_data(float(angle)), columns, p)[0].reshape(x.shape)
 
-    def loads(self, state: ArrayLike, wind: ArrayLike, pitch: ArrayLike = 0.0) -> dict[str, Array]:
-        """Load channels [SI] for states (n, k) and wind signals (n, 3 or more), the accelerations being those of the equations.
+    def loads(
+        self,
+        state: ArrayLike,
+        wind: ArrayLike,
+        pitch: ArrayLike = 0.0,
+        signals: Sequence[Channel] | None = None,
+    ) -> dict[str, Array]:
+        """Load channels [SI] for states (n, k) and wind (n, 3 or more), the accelerations being those of the equations.
 
-        pitch [rad]: a number, or (n,), the pitch of each state.
+        pitch [rad]: a number, or (n,), the pitch of each state; signals: what the wind's columns are, None for those of the layout
+        and then the azimuthal harmonics, as far as they go.
         """
         from fatigue_runner.turbine.lanes import load_channels
 
-        angle, x, signals = (np.asarray(values, float) for values in (pitch, state, wind))
-        harmonics = signals.shape[1] > len(self.layout.wind)
+        angle, x, blown = (np.asarray(values, float) for values in (pitch, state, wind))
+        known = (*self.layout.wind, *HARMONICS)[: blown.shape[1]] if signals is None else signals
+        rows = np.zeros((len(blown), self.layout.wind_size(known)))
+        rows[:, self.layout.wind_rows(known)] = blown
+        harmonics = rows.shape[1] > len(self.layout.wind)
         if self.operation != FIXED:
             angle = np.asarray(0.0)
-        signals = np.pad(signals, ((0, 0), (0, kernel_rows(signals.shape[1]) - signals.shape[1])))
         if angle.ndim:
-            return load_channels(self.pitched_kernel_data(harmonics), x, signals, angle[:, None])
-        return load_channels(self.kernel_data(float(angle), harmonics), x, signals)
+            return load_channels(self.pitched_kernel_data(harmonics), x, rows, angle[:, None])
+        return load_channels(self.kernel_data(float(angle), harmonics), x, rows)
 
     def operating_point(
         self,

@@ -223,7 +223,8 @@ def _all_states(cases: Sequence[Viewed]) -> rrb.Grid:
             continue
         label = f"{_blade_free(channel.label, len(cases) == 1)} [{channel.read_unit}]"
         groups.setdefault(label, []).append(f"state/{channel.name}")
-    for channel in channels.WIND_SIGNALS:
+    winds = dict.fromkeys(channel for case in cases for channel in case.log.winds)
+    for channel in (c for c in winds if c not in channels.WIND_HARMONICS):
         groups[f"{channel.label} [{channel.read_unit}]"] = [f"wind/{channel.name}"]
     return rrb.Grid(*(_plot(label, cases, paths) for label, paths in groups.items()), name="States and wind")
 

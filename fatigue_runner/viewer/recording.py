@@ -215,7 +215,7 @@ class Stage:
                 f"plots/state/{channel.name}/{case.key}", time, log.state[index, place] * channel.scale
             )
         if len(log.wind):
-            for place, channel in enumerate(channels.WIND_SIGNALS):
+            for place, channel in enumerate(c for c in log.winds if c not in channels.WIND_HARMONICS):
                 self._series(f"plots/wind/{channel.name}/{case.key}", time, log.wind[index, place])
         for name, values in log.loads.items():
             self._series(f"plots/load/{name}/{case.key}", time, values[index] * read_unit(name)[1])

@@ -21,7 +21,7 @@ def read_unit(name: str) -> tuple[str, float]:
 
 def set_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> None:
     """Names and colours of all series of a case: by integrator where there are several, else by blade."""
-    groups = [("state", c) for c in case.log.states] + [("wind", c) for c in channels.WIND_SIGNALS]
+    groups = [("state", c) for c in case.log.states] + [("wind", c) for c in case.log.winds]
     groups += [("load", channels.BY_NAME[n]) for n in case.log.loads if n in channels.BY_NAME]
     for group, channel in groups:
         blade = next((i for i in (1, 2, 3) if channel.name.startswith(f"blade{i}")), None)

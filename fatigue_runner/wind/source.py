@@ -34,7 +34,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.layout import TRIPLE, WIND, harmonic_channels, kernel_rows
+from fatigue_runner.layout import WIND, Channel, harmonic_channels, triples
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.cells import ROUNDING, cell_count, evaluate, minimum
 from fatigue_runner.wind.checks import number
@@ -89,14 +89,20 @@ class WindSource(ABC):
         return 1
 
     @property
-    def triples(self) -> int:
-        """Harmonics beside the three signals in the kernels' threes; 0 where there are none."""
-        return (kernel_rows(self.signals) - len(WIND)) // (2 * TRIPLE)
+    def channels(self) -> tuple[Channel, ...]:
+        """The signals: three, signals of its own that the turbine's layout knows, and c_1, s_1, c_2, ... [m/s] of M > 1 harmonics
+        (`wind.azimuth`), which act all along the blade."""
+        return (*WIND, *harmonic_channels(self.harmonics))
 
     @property
     def signals(self) -> int:
-        """Number of signals: three, and c_1, s_1, c_2, ... [m/s] of M > 1 harmonics (`wind.azimuth`), which act all along the blade."""
-        return len(WIND) + len(harmonic_channels(self.harmonics))
+        """Their number."""
+        return len(self.channels)
+
+    @property
+    def triples(self) -> int:
+        """Harmonics among them in the kernels' threes; 0 where there are none."""
+        return triples(self.channels)
 
     @property
     def notes(self) -> tuple[str, ...]:

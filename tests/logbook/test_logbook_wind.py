@@ -77,6 +77,19 @@ def test_the_numbers_of_the_harmonics_never_change():
     assert all(numbers[f"wind_sin_{m}"] == 100 + 2 * m for m in range(1, 17))
 
 
+def test_a_signal_of_the_equations_own_stands_before_the_harmonics_and_has_its_name_and_unit(tmp_path):
+    gust = channels.Channel("gust", "m/s", "gust", "m/s")
+    signals = (*channels.WIND_SIGNALS, gust, *channels.WIND_HARMONICS[:4])
+    wind = np.concatenate([example().wind, np.random.default_rng(3).normal(size=(400, 5))], axis=1)
+    run = replace(example(), wind=wind, wind_signals=signals)
+    path = write_log(tmp_path / "a.mcap", run, RUN)
+    log = read_log(path)
+    assert differing(log, run) == [] and [c.name for c in log.winds] == [c.name for c in signals]
+    assert log.winds[3].unit == "m/s" and check(path).complete
+    assert declared(path) == ["time", *(c.name for c in signals)]
+    assert export(path, ["gust"], tmp_path / "a.csv") == ["time", "gust"]
+
+
 @pytest.mark.parametrize(("columns", "words"), [(4, "3 \\+ 2 M"), (40, "35 or fewer")])
 def test_a_wind_that_is_no_whole_number_of_pairs_or_too_many_is_refused(tmp_path, columns, words):
     with pytest.raises(LogError, match=words):
