@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from fatigue_runner.api import (
         ConstantWind,
         FullFieldWind,
+        GustWind,
         PitchSeries,
         SeriesWind,
         StepWind,
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ConstantWind",
     "FullFieldWind",
+    "GustWind",
     "PitchSeries",
     "SeriesWind",
     "StepWind",

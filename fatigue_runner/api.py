@@ -12,7 +12,15 @@ from fatigue_runner.fatigue import damage_equivalent_load, rainflow
 from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
 from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
 from fatigue_runner.turbine import load_turbine
-from fatigue_runner.wind import ConstantWind, FullFieldWind, SeriesWind, StepWind, TurbulentWind, WindSource
+from fatigue_runner.wind import (
+    ConstantWind,
+    FullFieldWind,
+    GustWind,
+    SeriesWind,
+    StepWind,
+    TurbulentWind,
+    WindSource,
+)
 
 if TYPE_CHECKING:
     from fatigue_runner.trajectory import Trajectory
@@ -20,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ConstantWind",
     "FullFieldWind",
+    "GustWind",
     "PitchSeries",
     "SeriesWind",
     "StepWind",

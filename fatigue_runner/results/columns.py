@@ -45,6 +45,7 @@ CASE = (
     Column("turbulence_intensity", "wind", "standard deviation over mean of the wind at a point at the hub; of a series, its own"),
     Column("harmonics", "wind", "azimuthal harmonics of the wind that the blades feel; 1: linear shears", kind="whole"),
     Column("seed", "wind", "of the turbulence", kind="whole"),
+    _text("gust", "wind", "extreme wind of IEC 61400-1 that blows"),
     _text("wind_file", "wind", "file that the wind was read from"),
     Column("rotor_intensity", "statistics", "standard deviation over mean of the wind averaged over the rotor, in the counted time"),
     _text("operation", "operation", "who steers: fixed, torque-law or controlled"),

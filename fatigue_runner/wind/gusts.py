@@ -78,6 +78,7 @@ class Gust:
     """
 
     code: ClassVar[str]
+    words: ClassVar[str]
     duration: ClassVar[float]
 
     def speed(self, site: Site, time: np.ndarray) -> np.ndarray:
@@ -114,6 +115,7 @@ class OperatingGust(Gust):
     """
 
     code = "EOG"
+    words = "extreme operating gust"
     duration = 10.5
 
     @staticmethod
@@ -132,6 +134,7 @@ class DirectionChange(Gust):
     """EDC: the wind turns by 4 arctan(sigma_1 / (V (1 + 0.1 D/Lambda_1))), at most 180 degrees, in T = 6 s."""
 
     code = "EDC"
+    words = "extreme direction change"
     duration = 6.0
     sign: int = 1
 
@@ -153,6 +156,7 @@ class CoherentGust(Gust):
     """ECD: the wind rises by 15 m/s and turns by 180 degrees (below 4 m/s) or 720 degrees m/s / V, in T = 10 s."""
 
     code = "ECD"
+    words = "extreme coherent gust with direction change"
     duration = 10.0
     sign: int = 1
     magnitude: ClassVar[float] = 15.0  # m/s
@@ -181,6 +185,7 @@ class ExtremeShear(Gust):
     """
 
     code = "EWS"
+    words = "extreme wind shear"
     duration = 12.0
     across: Literal["vertical", "horizontal"] = "vertical"
     sign: int = 1
@@ -204,6 +209,19 @@ class ExtremeShear(Gust):
 
 
 GUSTS = {gust.code: gust for gust in (OperatingGust, DirectionChange, CoherentGust, ExtremeShear)}
+
+# The transients by the names that design load cases have them under, V for vertical and H for horizontal shear
+EVENTS: dict[str, Gust] = {
+    "EOG": OperatingGust(),
+    "EDC+": DirectionChange(1),
+    "EDC-": DirectionChange(-1),
+    "ECD+": CoherentGust(1),
+    "ECD-": CoherentGust(-1),
+    "EWSV+": ExtremeShear("vertical", 1),
+    "EWSV-": ExtremeShear("vertical", -1),
+    "EWSH+": ExtremeShear("horizontal", 1),
+    "EWSH-": ExtremeShear("horizontal", -1),
+}
 
 
 @dataclass(frozen=True)
