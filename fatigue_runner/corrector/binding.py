@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import method as find_method
+from fatigue_runner.turbine.turbine import FIXED
 
 if TYPE_CHECKING:
     from fatigue_runner.integrators.contract import Method
@@ -47,6 +48,11 @@ class Binding:
     def refusal(self, turbine: Turbine, method: str, step: float) -> str:
         """Why the corrector does not fit a run, and the way out; empty where it fits."""
         if turbine.hash != self.turbine_hash:
+            if turbine.operation != FIXED and turbine.operated(FIXED).hash == self.turbine_hash:
+                return (
+                    f"was trained for {self.turbine} at fixed pitch, under operation {turbine.operation!r} the equations are others; "
+                    f"leave it out (recipes do not know operations yet), or use `operation: {FIXED}`"
+                )
             return (
                 f"was trained for turbine {self.turbine} ({self.turbine_hash[:12]}), this is {turbine.name} "
                 f"({turbine.hash[:12]}); train one with `fatigue-runner train`"

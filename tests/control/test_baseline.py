@@ -183,3 +183,55 @@ def test_wrong_operations_are_refused_in_one_sentence(nrel5mw):
         load_turbine("t2b1i1cg").operated("controlled")
     with pytest.raises(InputError, match="makes the pitch itself"):
         simulate(nrel5mw, 14.0, duration=1.0, pitch=0.1, operation="controlled")
+
+
+# Transients beside OpenFAST's: the same degrees of freedom, the report's DISCON, uniform wind
+
+
+def extremes(turbine, start, time, wind, duration):
+    """Largest and smallest rotor speed [rpm], pitch [deg] and loads [kN m], from 20 s on."""
+    run = simulate(
+        turbine, SeriesWind(time[1], wind), "dop853", 0.05, duration, turbine.operating_point(start), 0.05, operation="controlled"
+    )  # fmt: skip
+    told = {
+        "speed": run.state[:, 14] / RPM,
+        "pitch": np.degrees(run.pitch),
+        "torque": run.loads["generator_torque"] / 1e3,
+        "flap": run.loads["blade1_root_flapwise_moment"] / 1e3,
+        "tower": run.loads["tower_base_fore_aft_moment"] / 1e3,
+    }
+    return {name: (values[400:].min(), values[400:].max()) for name, values in told.items()}
+
+
+def check_extremes(found, openfast, share):
+    """Each extreme within that share of the range that OpenFAST's value runs through."""
+    for name, (low, high) in openfast.items():
+        assert found[name] == pytest.approx((low, high), abs=share * (high - low)), name
+
+
+def test_an_extreme_operating_gust_at_rated_wind_is_openfast_s(turbine):
+    """12 - 1.85 sin(3 pi t / 10.5) (1 - cos(2 pi t / 10.5)) m/s, from 100 s on: the blades are pitched by ten degrees and back."""
+    time = np.arange(0, 201, 0.05)
+    gust = np.where((time >= 100) & (time <= 110.5), time - 100, 0.0)
+    wind = 12 - 1.85 * np.sin(3 * np.pi * gust / 10.5) * (1 - np.cos(2 * np.pi * gust / 10.5))
+    openfast = {
+        "speed": (11.11, 13.58),
+        "pitch": (0.0, 10.33),
+        "torque": (30.40, 46.64),
+        "flap": (957.4, 13114.8),
+        "tower": (-13514.9, 104736.1),
+    }
+    check_extremes(extremes(turbine, 12.0, time, wind, 200.0), openfast, 0.03)
+
+
+def test_steps_of_the_wind_above_rated_are_openfast_s(turbine):
+    """17, 19, 18, 20 m/s, in 0.2 s each, a hundred seconds apart."""
+    time = np.arange(0, 401, 0.05)
+    wind = np.interp(time, [100, 100.2, 200, 200.2, 300, 300.2], [17.0, 19, 19, 18, 18, 20])
+    openfast = {
+        "speed": (11.69, 12.92),
+        "pitch": (13.41, 17.74),
+        "torque": (40.52, 44.51),
+        "tower": (12740.6, 53186.8),
+    }
+    check_extremes(extremes(turbine, 17.0, time, wind, 400.0), openfast, 0.04)

@@ -21,6 +21,7 @@ from simulating import simulate_block
 
 from fatigue_runner.corrector import coordinates, features, samples, threshold
 from fatigue_runner.errors import InputError
+from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind, TurbulentWind
 
 UNSEEN = ConstantWind(7.4, 0.1, 0.02)
@@ -218,11 +219,18 @@ def test_a_run_that_does_not_fit_the_corrector_is_refused(change, words):
 
 
 def test_a_corrector_of_another_turbine_is_refused():
-    from fatigue_runner.turbine import load_turbine
-
     other = load_turbine("t2b1i1cg")
     with pytest.raises(InputError, match="was trained for turbine nrel5mw"):
         simulate_block(other, "heun", 0.02, [UNSEEN], start(), 1.0, corrector=trained())
+
+
+def test_a_corrector_for_fixed_pitch_is_refused_under_a_controller():
+    turbine = load_turbine("nrel5mw").operated("controlled")
+    words = "trained for nrel5mw at fixed pitch, under operation 'controlled' .* use `operation: fixed`"
+    with pytest.raises(InputError, match=words):
+        simulate_block(
+            turbine, "heun", 0.02, [UNSEEN], turbine.operating_point(8.0)[None], 1.0, corrector=trained()
+        )
 
 
 class TestSamples:
