@@ -228,7 +228,7 @@ def _turning(name: str, label: str, speed: str, speed_label: str, nudge: float) 
 
 
 WIND = (
-    Channel("wind_speed", "m/s", "hub-height wind speed", "m/s"),
+    Channel("wind_speed", "m/s", "wind speed, mean over the rotor", "m/s"),
     Channel("vertical_shear", "-", "linear vertical shear", "-"),
     Channel("horizontal_shear", "-", "linear horizontal shear", "-"),
 )

@@ -9,6 +9,7 @@ import rerun.blueprint as rrb
 
 from fatigue_runner import channels
 from fatigue_runner.viewer.cases import Viewed
+from fatigue_runner.viewer.inflow import BLADE_WIND, SPAN
 from fatigue_runner.viewer.recording import TIMELINE, band_lane
 from fatigue_runner.viewer.styles import read_unit
 
@@ -93,8 +94,11 @@ def overview(cases: Sequence[Viewed]) -> rrb.Container:
         while len(plots) < 4:
             plots.append(_more_plots(cases)[len(plots) - 2])
             shares.append(2.4)
-        beside = rrb.Vertical(*plots, row_shares=shares)
-        return rrb.Horizontal(scene_view(cases), beside, column_shares=[3, 2], name="Turbine")
+        beside: rrb.Container = rrb.Vertical(*plots, row_shares=shares)
+        scene: rrb.Container | rrb.View = scene_view(cases)
+        if len(cases[0].log.wind):
+            scene = rrb.Vertical(scene, _wind_plot(cases), row_shares=[4, 1])
+        return rrb.Horizontal(scene, beside, column_shares=[3, 2], name="Turbine")
     # Curves of good integrators lie on each other; their errors do not.
     if any(_has(case, "reference_error") for case in cases):
         plots.append(_error_plot(cases))
@@ -105,10 +109,20 @@ def overview(cases: Sequence[Viewed]) -> rrb.Container:
 
 def _more_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
     """What fills the first screen where the solver has little to tell."""
-    return [
-        _plot("Wind speed at the hub [m/s]", cases[:1], ["wind/wind_speed"]),
-        _plot("Rotor speed [rpm]", cases, ["state/rotor_speed"]),
-    ]
+    rotor = _plot("Rotor speed [rpm]", cases, ["state/rotor_speed"])
+    torque = _plot("Low-speed shaft torque [MN·m]", cases, ["load/low_speed_shaft_torque"])
+    return [rotor, torque] if len(cases) == 1 else [_wind_plot(cases), rotor]
+
+
+def _wind_plot(cases: Sequence[Viewed], live: bool = False) -> rrb.TimeSeriesView:
+    """The wind of the first case's blades, each at its own azimuth, and of the rotor; other integrators have the same wind."""
+    paths = [f"wind/{channel.name}" for channel in BLADE_WIND]
+    return _plot(
+        f"Wind at {SPAN:g} R of each blade, and over the rotor [m/s]",
+        cases[:1],
+        [*paths, "wind/wind_speed"],
+        live=live,
+    )
 
 
 def scene_view(cases: Sequence[Viewed]) -> rrb.Spatial3DView:
@@ -223,10 +237,21 @@ def _all_states(cases: Sequence[Viewed]) -> rrb.Grid:
             continue
         label = f"{_blade_free(channel.label, len(cases) == 1)} [{channel.read_unit}]"
         groups.setdefault(label, []).append(f"state/{channel.name}")
+    views = [_plot(label, cases, paths) for label, paths in groups.items()]
+    return rrb.Grid(*views, *_all_wind(cases), name="States and wind")
+
+
+def _all_wind(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
+    """The rotor's signals, each blade's own wind, and the harmonics' amplitudes."""
     winds = dict.fromkeys(channel for case in cases for channel in case.log.winds)
-    for channel in (c for c in winds if c not in channels.WIND_HARMONICS):
-        groups[f"{channel.label} [{channel.read_unit}]"] = [f"wind/{channel.name}"]
-    return rrb.Grid(*(_plot(label, cases, paths) for label, paths in groups.items()), name="States and wind")
+    rotor = [c for c in winds if c not in channels.WIND_HARMONICS]
+    views = [_plot(f"{c.label} [{c.read_unit}]", cases, [f"wind/{c.name}"]) for c in rotor]
+    views.append(_wind_plot(cases))
+    for word, begin in (("cosine", "wind_cos_"), ("sine", "wind_sin_")):
+        paths = [f"wind/{c.name}" for c in winds if c in channels.WIND_HARMONICS and c.name.startswith(begin)]
+        if paths:
+            views.append(_plot(f"Azimuthal harmonics of the wind, {word} [m/s]", cases[:1], paths))
+    return views
 
 
 def _blade_free(label: str, together: bool) -> str:

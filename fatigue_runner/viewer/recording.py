@@ -13,15 +13,18 @@ import numpy as np
 import rerun as rr
 
 from fatigue_runner import channels
+from fatigue_runner.layout import BLADES
 from fatigue_runner.viewer import colours, shapes
 from fatigue_runner.viewer.cases import Viewed
-from fatigue_runner.viewer.scene import DRAWN, local_wind
+from fatigue_runner.viewer.inflow import BLADE_WIND, SPAN, blade_wind, local_wind
+from fatigue_runner.viewer.scene import AZIMUTH, DRAWN
 from fatigue_runner.viewer.styles import SOLVER_SERIES, read_unit, set_style
 
 TIMELINE = "time"
 FRAME_RATE = 20.0  # Hz, of the 3-D scene; series keep the log's rate
 MAX_FRAMES = 8000  # in all turbines together; a frame is 5 kB
-WIND_RATE = 4.0  # Hz, colours of the rotor disc
+WIND_RATE = 4.0  # Hz, colours of the rotor disc, and numbers at the blades
+ARROW_SCALE = 3.0  # m of an arrow per m/s of wind at a blade
 BAND_POINTS = 4000  # a band of more points looks the same and draws slower
 TOWER_LEVELS = 9
 BLOCK = 4096  # rows per message
@@ -80,6 +83,11 @@ class Stage:
             )
         for blade in (1, 2, 3):
             self._log(f"{root}/blade{blade}", rr.Mesh3D.from_fields(triangle_indices=case.skin.triangles()))
+        if len(case.log.wind):
+            arrows = rr.Arrows3D.from_fields(colors=colours.BLADES, radii=0.5)
+            self._log(f"{root}/blade_wind", arrows)
+            speeds = rr.Points3D.from_fields(colors=colours.BLADES, radii=0.01, show_labels=True)
+            self._log(f"{root}/blade_wind/speed", speeds)
         points, triangles = shapes.disc_points(case.geometry)
         disc = np.column_stack(
             [np.full(len(points), _disc_x(case)), points + np.array([0.0, case.geometry.hub_height])]
@@ -162,8 +170,13 @@ class Stage:
         frames = frames[np.isfinite(case.log.state[frames][:, DRAWN]).all(axis=1)]
         if len(frames):
             self._send_turbine(case, frames)
+        if not len(case.log.wind):
+            return
+        if len(frames):
+            self._send_arrows(case, frames)
         frames = self._frames(case, rows, WIND_RATE, MAX_FRAMES // (4 * len(self.cases)))
-        if len(frames) and len(case.log.wind):
+        if len(frames):
+            self._send_speeds(case, frames)
             shade = colours.on_scale(_disc_wind(case, frames), *self.wind_range, colours.WIND_SCALE)
             self._columns(
                 f"scene/{case.key}/wind",
@@ -187,6 +200,30 @@ class Stage:
             self._mesh(
                 f"{root}/blade{blade + 1}", time, blades[:, blade], case.skin.triangles(), shade[:, blade]
             )
+
+    def _send_arrows(self, case: Viewed, frames: np.ndarray) -> None:
+        """The wind of each blade as an arrow that ends at the blade, in the colour of its curve."""
+        pose = case.geometry.pose(
+            case.log.state[frames], np.array([SPAN * case.geometry.radius]), scale=self.scale
+        )
+        ends, speed = pose.blades[:, :, 0], _blade_wind(case, frames)
+        vectors = np.zeros_like(ends)
+        vectors[..., 0] = ARROW_SCALE * np.nan_to_num(speed)
+        tails, each = (ends - vectors).reshape(-1, 3), [BLADES] * len(frames)
+        arrows = rr.Arrows3D.columns(origins=tails, vectors=vectors.reshape(-1, 3))
+        self._columns(f"scene/{case.key}/blade_wind", case.log.time[frames], arrows.partition(each))
+        if len(self.cases) == 1:
+            points = rr.Points3D.columns(positions=tails)
+            self._columns(f"scene/{case.key}/blade_wind/speed", case.log.time[frames], points.partition(each))
+
+    def _send_speeds(self, case: Viewed, frames: np.ndarray) -> None:
+        """What the arrows say in numbers, of one turbine: more would be a tangle. They change more slowly, to be read."""
+        if len(self.cases) > 1:
+            return
+        speeds = _blade_wind(case, frames).reshape(-1)
+        labels = [f"{speed:.1f} m/s" if np.isfinite(speed) else "" for speed in speeds]
+        told = rr.Points3D.columns(labels=labels).partition([BLADES] * len(frames))
+        self._columns(f"scene/{case.key}/blade_wind/speed", case.log.time[frames], told)
 
     def _mesh(
         self,
@@ -215,8 +252,10 @@ class Stage:
                 f"plots/state/{channel.name}/{case.key}", time, log.state[index, place] * channel.scale
             )
         if len(log.wind):
-            for place, channel in enumerate(c for c in log.winds if c not in channels.WIND_HARMONICS):
+            for place, channel in enumerate(log.winds):
                 self._series(f"plots/wind/{channel.name}/{case.key}", time, log.wind[index, place])
+            for channel, values in zip(BLADE_WIND, _blade_wind(case, index).T, strict=True):
+                self._series(f"plots/wind/{channel.name}/{case.key}", time, values)
         for name, values in log.loads.items():
             self._series(f"plots/load/{name}/{case.key}", time, values[index] * read_unit(name)[1])
         self._send_solver(case, rows, stride)
@@ -288,17 +327,26 @@ def _flap(case: Viewed) -> np.ndarray:
     )
 
 
+def _signals(case: Viewed, rows: Any) -> np.ndarray:
+    """(rows, 3 + 2 M) speed, shears and harmonics, without what else a wind may have."""
+    felt = [c in (*channels.WIND_SIGNALS, *channels.WIND_HARMONICS) for c in case.log.winds]
+    return case.log.wind[rows][:, felt]
+
+
 def _disc_wind(case: Viewed, rows: Any) -> np.ndarray:
-    """(rows, points) wind on the rotor disc [m/s]."""
+    """(rows, points) wind on the rotor disc [m/s]; of a slice some rows."""
     if not len(case.log.wind):
         return np.empty((0, 1))
     y, z = shapes.disc_points(case.geometry)[0].T
-    wind = (
-        case.log.wind[rows]
-        if not isinstance(rows, slice)
-        else case.log.wind[rows][:: max(1, len(case.log.wind) // 500)]
-    )
+    wind = _signals(case, rows)
+    if isinstance(rows, slice):
+        wind = wind[:: max(1, len(case.log.wind) // 500)]
     return local_wind(wind, y, z, case.geometry.radius)
+
+
+def _blade_wind(case: Viewed, rows: np.ndarray) -> np.ndarray:
+    """(rows, 3) wind at each blade [m/s]."""
+    return blade_wind(_signals(case, rows), case.log.state[rows, AZIMUTH])
 
 
 def _disc_x(case: Viewed) -> float:

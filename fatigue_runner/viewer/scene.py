@@ -27,8 +27,8 @@ Array = NDArray[np.float64]
 
 _FORE_AFT, _SIDE_SIDE, _EDGE = (T2B1I1CG.row(name) for name in ("tower_fore_aft", "tower_side_side", "edge"))
 _FLAPS = slice(T2B1I1CG.blade_sets[0], T2B1I1CG.blade_sets[0] + BLADES)
-_AZIMUTH = T2B1I1CG.rotor
-DRAWN = slice(0, _AZIMUTH + 1)  # the states that a picture needs
+AZIMUTH = T2B1I1CG.rotor
+DRAWN = slice(0, AZIMUTH + 1)  # the states that a picture needs
 _AROUND: Array = np.linspace(0.0, 2 * pi, BLADES, endpoint=False)  # the blades' places on the hub [rad]
 
 
@@ -108,7 +108,7 @@ class Geometry:
         apex = tower[:, -1] + nacelle @ arm
         # the shaft axis is (cos tilt, 0, sin tilt) in N
         shaft = nacelle @ rotation_y(np.array([-self.tilt]))
-        rotor = shaft @ rotation_x(state[:, _AZIMUTH])
+        rotor = shaft @ rotation_x(state[:, AZIMUTH])
         place = rotation_x(_AROUND) @ rotation_y(np.full(BLADES, self.cone))
         coned = rotor[:, None] @ place
         local = self.deflection(state, radius, scale)
@@ -152,12 +152,6 @@ def geometry(turbine: Mapping[str, Any], pitch: float = 0.0) -> Geometry:
         )
     except KeyError as missing:
         raise InputError(f"turbine {turbine.get('name', '?')}: the entry {missing} is missing") from None
-
-
-def local_wind(wind: Array, y: Array, z: Array, radius: float) -> Array:
-    """Wind speed (n, points) [m/s] at points (y, z) [m] about the hub for signals (n, 3) = (v, vertical, horizontal shear)."""
-    v, vertical, horizontal = (wind[:, i, None] for i in range(3))
-    return v * (1.0 + vertical * z / radius + horizontal * y / radius)
 
 
 def rotation_x(angle: Array) -> Array:

@@ -137,10 +137,13 @@ def nacelle_skin(geometry: Geometry) -> tuple[NDArray[np.float32], Triangles]:
     return points.reshape(-1, 3).astype(np.float32), tube_triangles(len(x), sides)
 
 
-def disc_points(geometry: Geometry, rings: int = 7, sides: int = 36) -> tuple[Array, Triangles]:
-    """(points, 2) y, z about the hub and the triangles of the rotor disc."""
+def disc_points(geometry: Geometry, rings: int = 5, sides: int = 72) -> tuple[Array, Triangles]:
+    """(points, 2) y, z about the hub and the triangles of the rotor disc, from the blades' roots on.
+
+    Twelve points per period of the sixth harmonic; along the radius the wind is linear, and few rings hold it.
+    """
     angle = np.arange(sides) * 2 * pi / sides
-    r = geometry.radius * np.linspace(1e-3, 1.0, rings)
+    r = np.linspace(geometry.blade.hub_radius, geometry.radius, rings)
     points = np.stack([r[:, None] * np.cos(angle), r[:, None] * np.sin(angle)], axis=-1).reshape(-1, 2)
     return points, tube_triangles(rings, sides)[: 2 * sides * (rings - 1)]
 

@@ -7,6 +7,7 @@ import rerun as rr
 from fatigue_runner import channels
 from fatigue_runner.viewer import colours
 from fatigue_runner.viewer.cases import Viewed
+from fatigue_runner.viewer.inflow import BLADE_WIND
 
 SOLVER_SERIES = ("discrepancy", "threshold", "local_error", "reference_error")
 
@@ -21,14 +22,18 @@ def read_unit(name: str) -> tuple[str, float]:
 
 def set_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> None:
     """Names and colours of all series of a case: by integrator where there are several, else by blade."""
-    groups = [("state", c) for c in case.log.states] + [("wind", c) for c in case.log.winds]
+    groups = [("state", c) for c in case.log.states]
+    groups += [("wind", c) for c in (*case.log.winds, *BLADE_WIND)]
     groups += [("load", channels.BY_NAME[n]) for n in case.log.loads if n in channels.BY_NAME]
     for group, channel in groups:
         blade = next((i for i in (1, 2, 3) if channel.name.startswith(f"blade{i}")), None)
         colour, name = case.colour, case.label
-        if not several:
+        # the wind at the blades is told of one case, the others have the same
+        if not several or channel in BLADE_WIND:
             name = channel.label
             colour = colours.BLADES[blade - 1] if blade else colours.INTEGRATORS[0]
+        if group == "wind" and blade is None and not several:
+            colour = _signal_colour(channel.name)
         style = rr.SeriesLines(names=name, colors=colour, widths=1.6 if not case.is_reference else 2.6)
         recording.log(f"plots/{group}/{channel.name}/{case.key}", style, static=True)
     # what shares no plot with another series of the same case needs no more than the case's name
@@ -56,6 +61,14 @@ def set_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> Non
                 ),
                 static=True,
             )
+
+
+def _signal_colour(name: str) -> tuple[int, int, int]:
+    """The rotor's signals as the reference; harmonics, whose amplitudes share a plot, one after another."""
+    harmonics = [c.name for c in channels.WIND_HARMONICS]
+    if name not in harmonics:
+        return colours.REFERENCE
+    return colours.INTEGRATORS[harmonics.index(name) // 2 % len(colours.INTEGRATORS)]
 
 
 def _name(case: Viewed, what: str, several: bool, alone: bool) -> str:

@@ -199,7 +199,8 @@ class TestWithRerun:
         assert rows["plots/load/tower_base_fore_aft_moment"] == rows["plots/state/edge"] == 1201
         assert rows["plots/solver/discrepancy"] == 1200
         assert (rows["plots/solver/accepted"], rows["plots/solver/fallen_back"]) == (800, 400)
-        assert rows["scene/blade1"] == rows["scene/hub"] == 301
+        assert rows["scene/blade1"] == rows["scene/hub"] == rows["scene/blade_wind"] == 301
+        assert rows["plots/wind/blade2_wind"] == rows["plots/wind/wind_sin_2"] == 1201
 
     def test_live_view_forwards_at_most_its_rate_and_the_largest_error_of_each_group(self, tmp_path):
         every = sent(write(tmp_path, rows=1201))  # 60 s at 20 Hz

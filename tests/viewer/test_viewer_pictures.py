@@ -40,7 +40,7 @@ def test_first_screen_shows_turning_blades_a_tower_and_plots(one):
     third_of_a_turn = 2 * np.pi / 3 / ROTOR_SPEED
     with screen(one) as viewer:
         start, later, again = (viewer.at(t) for t in (3.0, 3.0 + third_of_a_turn / 2, 3.0 + third_of_a_turn))
-    scene = (0.17, 0.59, 0.12, 0.88)
+    scene = (0.19, 0.59, 0.12, 0.77)
     blades = warm(part(start, *scene))
     assert blades.sum() > 3000, "the blades are coloured by their flap moment"
     moved = warm(part(later, *scene))
@@ -49,14 +49,18 @@ def test_first_screen_shows_turning_blades_a_tower_and_plots(one):
     assert (blades & back).sum() > 2 * (blades & moved).sum(), (
         "a third of a turn later each is in another's place"
     )
-    tower = part(start, 0.29, 0.35, 0.55, 0.78)
+    tower = part(start, 0.29, 0.35, 0.48, 0.64)
     grey = (np.ptp(tower.astype(int), axis=-1) < 12) & (tower.max(axis=-1) > 150)
     assert grey.any(axis=1).mean() > 0.9, "the tower stands under them"
     disc = part(start, *scene).astype(int)
     assert ((disc[..., 2] > disc[..., 0] + 40) & (disc[..., 2] > 90)).sum() > 20000, "the wind is behind them"
-    plots = part(start, 0.61, 0.99)
+    plots, winds = part(start, 0.61, 0.99), part(start, 0.02, 0.5, 0.82, 0.95)
     for colour in colours.BLADES:
         assert near(plots, colour).sum() > 300, "each blade has its curve"
+        assert near(winds, colour).sum() > 300, "and below the scene that of its own wind"
+        assert near(part(start, *scene), colour, 15).sum() > 30, (
+            "which an arrow and a number show at the blade"
+        )
 
 
 def test_band_is_green_where_the_network_was_trusted_and_red_where_not(one):

@@ -11,7 +11,6 @@ from viewer_example import motion, shape
 from fatigue_runner.errors import InputError
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.viewer import colours, shapes
-from fatigue_runner.viewer.scene import local_wind
 
 SPAN = np.linspace(1.5, 63.0, 400)
 
@@ -128,12 +127,6 @@ def test_straight_pitch_axes_are_the_blades_of_an_undeflected_turbine():
 def test_states_of_another_shape_are_refused():
     with pytest.raises(InputError, match=r"\(n, 16 or more\), got \(16,\)"):
         shape().pose(np.zeros(16), SPAN)
-
-
-def test_disc_wind_is_the_linear_shear_of_the_design():
-    wind = np.array([[8.0, 0.25, -0.125]])
-    v = local_wind(wind, np.array([0.0, 0.0, 63.0]), np.array([0.0, 63.0, 0.0]), 63.0)
-    assert v[0] == pytest.approx([8.0, 8.0 * 1.25, 8.0 * 0.875])
 
 
 def test_blade_skin_has_the_turbine_file_s_chord_across_the_pitch_axis():

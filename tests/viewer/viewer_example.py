@@ -23,6 +23,11 @@ def shape(name: str = "nrel5mw", pitch: float = 0.0) -> Geometry:
     return geometry(read_turbine_file(name), pitch)
 
 
+def harmonics(time: np.ndarray) -> list[np.ndarray]:
+    """Amplitudes c_1, s_1, c_2, s_2 [m/s] of the example's wind."""
+    return [amplitude * np.cos(0.2 * time) for amplitude in (0.5, -0.8, 0.4, 0.3)]
+
+
 def motion(rows: int = 400, step: float = 0.05, error: float = 0.0) -> Trajectory:
     """A turning, bending turbine; the last third of its steps fell back; `error` is added to the flap."""
     time = step * np.arange(rows)
@@ -42,7 +47,7 @@ def motion(rows: int = 400, step: float = 0.05, error: float = 0.0) -> Trajector
         loads[f"blade{i}_tip_out_of_plane"] = tips[:, i - 1, 0]
         loads[f"blade{i}_tip_in_plane"] = tips[:, i - 1, 1]
     discrepancy = np.where(np.arange(rows - 1) < 2 * rows // 3, 0.1, 2.0)
-    wind = np.column_stack([10 + np.sin(time / 3), np.full(rows, 0.14), np.zeros(rows)])
+    wind = np.column_stack([10 + np.sin(time / 3), np.full(rows, 0.14), np.zeros(rows), *harmonics(time)])
     return Trajectory(
         time=time, state=state, wind=wind, loads=loads,
         accepted=discrepancy < 1.0, discrepancy=discrepancy, threshold=np.ones(rows - 1),
