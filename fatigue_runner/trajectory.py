@@ -14,12 +14,13 @@ class Trajectory:
     """One case, sampled at the output times.
 
     time (n,) [s]; state (n, k) in the order of `states`, which are `channels.STATES` and the first-order states of a controller, say,
-    behind them; wind (n, k) in the order of `winds`: `wind_signals` where they are given, else `channels.wind_channels`;
-    loads {channel: (n,)} SI. The status arrays have one entry per output interval, (n-1,): `accepted` is False where any
-    step in the interval fell back, `discrepancy` and `threshold` are the hybrid's norms (NaN where there is no test),
-    `local_error` the embedded error estimate's largest scaled component (NaN for methods without one).
-    `diverged_at` [s] is None for a finished case; otherwise the arrays end there. pitch (n,) [rad]; control {state of the controller:
-    (n,)}, empty where the pitch is given.
+    behind them; wind (n, 3): speed and linear shears, or (n, 3 + 2 M) where the wind has M > 1 azimuthal harmonics, columns named by
+    `winds`: `wind_signals` where they are given, else `channels.wind_channels` (docs/wind.md); loads {channel: (n,)} SI.
+
+    The status arrays have one entry per output interval, (n-1,): `accepted` is False where any step in the interval fell back,
+    `discrepancy` and `threshold` are the hybrid's norms (NaN where there is no test), `local_error` the embedded error estimate's largest
+    scaled component (NaN for methods without one). `diverged_at` [s] is None for a finished case; otherwise the arrays end there.
+    pitch (n,) [rad]; control {state of the controller: (n,)}, empty where the pitch is given.
     """
 
     time: np.ndarray

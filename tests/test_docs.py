@@ -49,3 +49,14 @@ def test_links_of_the_repository_become_links_of_the_site():
     assert docs_site.rewritten("CONTRIBUTING.md", "[a](docs/logs.md)\n```\n[b](docs/logs.md)\n```") == (
         "[a](logs.md)\n```\n[b](docs/logs.md)\n```"
     )
+
+
+def test_every_key_of_every_type_of_wind_stands_on_its_page():
+    from fatigue_runner.wind.section import SECTIONS
+
+    page = (DOCS / "wind.md").read_text(encoding="utf-8")
+    for kind, section in SECTIONS.items():
+        (table,) = re.findall(rf"^\| `{kind}` \|.*\n((?:\|.*\n)+)", page, re.MULTILINE)
+        told = set(re.findall(r"`(\w+)`", table))
+        missing = set(section.model_fields) - {"type"} - told
+        assert not missing, f"docs/wind.md does not tell of {', '.join(sorted(missing))} of {kind} wind"
