@@ -12,6 +12,7 @@ from fatigue_runner.campaign import run_campaign
 from fatigue_runner.campaign.plan import make_plan
 from fatigue_runner.errors import InputError
 from fatigue_runner.logbook import read_log
+from fatigue_runner.report.rundata import load_run
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import TurbulentWind
 
@@ -86,6 +87,14 @@ def test_a_wind_from_a_file_is_in_the_table_by_the_file_s_name_and_notes_are_tol
     assert row["wind_file"] == "coarse.bts" and row["wind_source"] == "full-field" and row["seed"] is None
     log = read_log(tmp_path / "out" / "logs" / f"{row['case_id']}.mcap")
     assert log.run["wind_notes"] == note and log.run["wind_file"] == "coarse.bts"
+
+
+def test_two_gusts_at_one_speed_are_two_winds_in_the_table_and_the_report(tmp_path):
+    wind = {"type": "gust", "speeds": 8, "gusts": ["EOG", "EWSV+"], "turbulence_class": "A", "begin": 0}
+    run_campaign(TURBULENT | {"wind": wind, "duration": 13, "output_rate": 20}, tmp_path / "out")
+    run = load_run(tmp_path / "out")
+    assert [wind.rows[0]["gust"] for wind in run.winds] == ["EOG", "EWSV+"]
+    assert [len(wind.rows) for wind in run.winds] == [2, 2]
 
 
 def test_a_channel_that_the_wind_does_not_have_is_refused_with_its_line_before_anything_runs(tmp_path):
