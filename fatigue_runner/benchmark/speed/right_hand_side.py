@@ -17,6 +17,7 @@ from fatigue_runner.turbine.generated import kernel, pitched
 from fatigue_runner.turbine.lane_code import LANES
 from fatigue_runner.turbine.lanes import aligned, counters, to_groups
 from fatigue_runner.turbine.model import rhs as rhs_of
+from fatigue_runner.wind import stack_cells
 
 Array = np.ndarray
 
@@ -98,11 +99,11 @@ def _slope(model: Any, t: float, x: Array, signals: Any, state: Array, slope: Ar
 
 def of_one_case(turbine: Any, wind: Any, duration: float, pitch: float) -> Callable[[float, Array], Array]:
     """f(t, x) of one case for `duration` [s] at a pitch [rad], compiled; the lanes beside it are wasted."""
-    data = turbine.kernel_data(pitch)
+    data = turbine.kernel_data(pitch, harmonics=wind.triples > 0)
     layout = data.model.layout
-    cell_duration, cells = wind.cells(duration)
+    cell_duration, cells = stack_cells([wind], duration, layout)
     block = to_groups(np.ascontiguousarray(cells.reshape(-1, 1))).reshape(len(cells), 4, -1)
-    signals = Signals(cell_duration, block, True, None, np.zeros(len(layout.wind) * LANES), np.zeros(0))
+    signals = Signals(cell_duration, block, True, None, np.zeros(block.shape[2]), np.zeros(0))
     state, slope = np.zeros(layout.size * LANES), np.zeros(layout.size * LANES)
     given = data.arrays(counters())
     return lambda t, x: _slope(data.model, t, x, signals, state, slope, given)

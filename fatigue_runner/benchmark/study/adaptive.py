@@ -18,7 +18,7 @@ from fatigue_runner.benchmark.study.cases import Cases
 from fatigue_runner.benchmark.study.integrators import ADAPTIVE
 from fatigue_runner.benchmark.study.points import Point, Reference, evaluate
 from fatigue_runner.integrators import Integrator, simulate
-from fatigue_runner.layout import T2B1I1CG
+from fatigue_runner.layout import T2B1I1CG, Channel
 
 METHODS = ("dop853-adaptive", "tsit5-adaptive")
 # Absolute tolerance of a state as a fraction of its range: the states differ by four orders of magnitude.
@@ -35,6 +35,7 @@ class Solved:
     loads: dict[str, np.ndarray]
     evaluations: int
     seconds: float
+    states: tuple[Channel, ...]
     diverged_at: float | None = None
 
     @property
@@ -100,9 +101,9 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
         old, old_slope = stepper.y.copy(), stepper.f.copy()
     seconds = time.perf_counter() - begin
     signals = wind.at(times)
-    loads = turbine.loads(states, signals, cases.pitch)
+    loads = turbine.loads(states, signals, cases.pitch, wind.channels)
     failed = stepper.t if stepper.status == "failed" else None
-    return Solved(times, states, signals, loads, stepper.nfev, seconds, failed)
+    return Solved(times, states, signals, loads, stepper.nfev, seconds, turbine.layout.states, failed)
 
 
 def measure(cases: Cases, reference: Reference, name: str, tolerance: float, count: int) -> Point:
