@@ -22,11 +22,13 @@ MOST_PROCESSES = 4
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """For `-n auto` (pyproject.toml): none for files or names that somebody picked, where starting processes takes longest."""
+    """For `-n auto` (pyproject.toml): none for files or names that somebody picked, where starting processes takes longest, and none
+    for slow tests: they start workers and viewers themselves, and what lives beside a run gets a core only where one is idle."""
     from joblib import cpu_count
 
-    everything = config.args_source is config.ArgsSource.TESTPATHS and not config.option.keyword
-    return min(MOST_PROCESSES, cpu_count()) if everything else 0
+    picked = config.args_source is not config.ArgsSource.TESTPATHS or config.option.keyword
+    slow = config.option.markexpr != "not slow"
+    return 0 if picked or slow else min(MOST_PROCESSES, cpu_count())
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
