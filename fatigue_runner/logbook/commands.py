@@ -15,9 +15,8 @@ from fatigue_runner import channels
 from fatigue_runner.logbook.check import check as check_log
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.export import export as export_log
-from fatigue_runner.logbook.reader import number
 from fatigue_runner.logbook.recovery import recover as recover_log
-from fatigue_runner.logbook.summary import Extreme, LogSummary, summarise
+from fatigue_runner.logbook.summary import TOLD, Extreme, LogSummary, summarise, what_ran
 from fatigue_runner.terminal import command_group
 
 app = command_group("Look into the logs of a run: what ran, whether the file is whole, repair it, export it.")
@@ -75,7 +74,7 @@ def _print_head(console: Console, summary: LogSummary, everything: bool) -> None
         status = summary.result.get("status", "unfinished")
         shade = "green" if status == "done" else "red"
         console.print(f"{escape(sentence)}: [{shade}]{escape(status)}[/]", soft_wrap=True)
-    told = () if everything or not sentence else _TOLD
+    told = () if everything or not sentence else TOLD
     _print_entries(console, "run", {k: v for k, v in summary.run.items() if k not in told})
     result = summary.result
     if not everything:
@@ -85,34 +84,6 @@ def _print_head(console: Console, summary: LogSummary, everything: bool) -> None
     if summary.attachments:
         names = ", ".join(f"{name} ({size} bytes)" for name, size in summary.attachments.items())
         console.print(f"attached: {escape(names)}", soft_wrap=True)
-
-
-# Entries of `run` that the sentence of `what_ran` tells; the case's name does not, as a person copies it from there.
-_TOLD = (
-    "method", "step", "corrector", "mode", "turbine", "wind", "wind_source", "wind_speed", "turbulence_intensity", "harmonics",
-    "seed", "is_reference",
-)  # fmt: skip
-
-
-def what_ran(run: Mapping[str, str]) -> str:
-    """`rk4 at 100 ms, corrected by rk4-100ms (hybrid), on nrel5mw in turbulent wind of 8 m/s`; empty where a log does not say."""
-    method, step = run.get("method"), number(run, "step")
-    if not method or step is None:
-        return ""
-    words = f"{method} at {step * 1e3:g} ms"
-    if run.get("corrector"):
-        words += f", corrected by {run['corrector']} ({run.get('mode', '')})"
-    if run.get("is_reference") == "True":
-        words += ", the reference"
-    words += f", on {run.get('turbine', '?')} in {run.get('wind_source', '')} wind".replace("  ", " ")
-    speed, intensity = number(run, "wind_speed"), number(run, "turbulence_intensity")
-    words += f" of {speed:g} m/s" if speed is not None else ""
-    # a series' own intensity is not a point's; where it is, the log tells what the rotor keeps of it
-    where = " at a point" if run.get("wind_strength") else ""
-    words += f", intensity {intensity:g}{where}" if intensity else ""
-    harmonics = number(run, "harmonics")
-    words += f", {harmonics:g} azimuthal harmonics" if harmonics is not None and harmonics > 1 else ""
-    return words + (f", seed {run['seed']}" if run.get("seed") else "")
 
 
 def _print_entries(console: Console, title: str, entries: Mapping[str, str]) -> None:

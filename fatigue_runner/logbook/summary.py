@@ -194,3 +194,31 @@ def summarise(path: str | os.PathLike[str]) -> LogSummary:
             summary.accepted_wind = _quantiles(speed[log.accepted])
     summary.reference_error = peak(log.reference_error, log.time[1:]) if log.reference_error.size else None
     return summary
+
+
+# Entries of `run` that the sentence of `what_ran` tells; the case's name does not, as a person copies it from there.
+TOLD = (
+    "method", "step", "corrector", "mode", "turbine", "wind", "wind_source", "wind_speed", "turbulence_intensity", "harmonics",
+    "seed", "is_reference",
+)  # fmt: skip
+
+
+def what_ran(run: Mapping[str, str]) -> str:
+    """`rk4 at 100 ms, corrected by rk4-100ms (hybrid), on nrel5mw in turbulent wind of 8 m/s`; empty where a log does not say."""
+    method, step = run.get("method"), number(run, "step")
+    if not method or step is None:
+        return ""
+    words = f"{method} at {step * 1e3:g} ms"
+    if run.get("corrector"):
+        words += f", corrected by {run['corrector']} ({run.get('mode', '')})"
+    if run.get("is_reference") == "True":
+        words += ", the reference"
+    words += f", on {run.get('turbine', '?')} in {run.get('wind_source', '')} wind".replace("  ", " ")
+    speed, intensity = number(run, "wind_speed"), number(run, "turbulence_intensity")
+    words += f" of {speed:g} m/s" if speed is not None else ""
+    # a series' own intensity is not a point's; where it is, the log tells what the rotor keeps of it
+    where = " at a point" if run.get("wind_strength") else ""
+    words += f", intensity {intensity:g}{where}" if intensity else ""
+    harmonics = number(run, "harmonics")
+    words += f", {harmonics:g} azimuthal harmonics" if harmonics is not None and harmonics > 1 else ""
+    return words + (f", seed {run['seed']}" if run.get("seed") else "")

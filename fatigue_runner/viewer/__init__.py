@@ -1,7 +1,7 @@
 """What is seen: logs in Rerun, as a moving turbine beside the plots of its loads; replayed, or live.
 
-`scene`, `shapes` and `colours` are plain arrays; `cases` reads the logs that are asked for; `recording`, `styles`
-and `blueprint` need Rerun (the extra `view`); `window` starts its viewer; `commands` is `fatigue-runner view`.
+`scene`, `inflow`, `shapes` and `colours` are plain arrays; `cases` reads the logs that are asked for; `recording`,
+`wind_scene`, `styles` and `blueprint` need Rerun (the extra `view`); `window` starts its viewer; `commands` is `fatigue-runner view`.
 `live` starts the separate process `bridge`, which follows a running campaign. Nothing here runs a simulation,
 and nothing imports Rerun before it is used.
 """

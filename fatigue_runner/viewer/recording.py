@@ -12,19 +12,16 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from fatigue_runner import channels
-from fatigue_runner.layout import BLADES
-from fatigue_runner.viewer import colours, shapes
+from fatigue_runner.viewer import colours, shapes, wind_scene
 from fatigue_runner.viewer.cases import Viewed
-from fatigue_runner.viewer.inflow import BLADE_WIND, SPAN, blade_wind, local_wind
-from fatigue_runner.viewer.scene import AZIMUTH, DRAWN
+from fatigue_runner.viewer.inflow import BLADE_WIND
+from fatigue_runner.viewer.scene import DRAWN
 from fatigue_runner.viewer.styles import SOLVER_SERIES, read_unit, set_style
 
 TIMELINE = "time"
 FRAME_RATE = 20.0  # Hz, of the 3-D scene; series keep the log's rate
 MAX_FRAMES = 8000  # in all turbines together; a frame is 5 kB
 WIND_RATE = 4.0  # Hz, colours of the rotor disc, and numbers at the blades
-ARROW_SCALE = 3.0  # m of an arrow per m/s of wind at a blade
 BAND_POINTS = 4000  # a band of more points looks the same and draws slower
 TOWER_LEVELS = 9
 BLOCK = 4096  # rows per message
@@ -45,7 +42,7 @@ class Stage:
     ) -> None:
         self.recording, self.cases, self.scale, self.series_rate = recording, cases, scale, series_rate
         self.flap_range = _range([_flap(case) for case in cases])
-        self.wind_range = _range([_disc_wind(case, slice(None)) for case in cases])
+        self.wind_range = _range([wind_scene.disc_wind(case, slice(None)) for case in cases])
 
     def set_up(self) -> None:
         """All that does not move: ground, names and colours of series, skins, the scales' legend."""
@@ -83,21 +80,7 @@ class Stage:
             )
         for blade in (1, 2, 3):
             self._log(f"{root}/blade{blade}", rr.Mesh3D.from_fields(triangle_indices=case.skin.triangles()))
-        if len(case.log.wind):
-            arrows = rr.Arrows3D.from_fields(colors=colours.BLADES, radii=0.5)
-            self._log(f"{root}/blade_wind", arrows)
-            speeds = rr.Points3D.from_fields(colors=colours.BLADES, radii=0.01, show_labels=True)
-            self._log(f"{root}/blade_wind/speed", speeds)
-        points, triangles = shapes.disc_points(case.geometry)
-        disc = np.column_stack(
-            [np.full(len(points), _disc_x(case)), points + np.array([0.0, case.geometry.hub_height])]
-        )
-        self._log(
-            f"{root}/wind",
-            rr.Mesh3D.from_fields(
-                vertex_positions=disc, triangle_indices=triangles, albedo_factor=(255, 255, 255, 90)
-            ),
-        )
+        wind_scene.set_up(self._log, case, root)
         # straight pitch axes under the hub's frame: how far the blades bend is the distance to them
         straight = case.geometry.straight_blades()
         self._log(
@@ -170,21 +153,19 @@ class Stage:
         frames = frames[np.isfinite(case.log.state[frames][:, DRAWN]).all(axis=1)]
         if len(frames):
             self._send_turbine(case, frames)
-        if not len(case.log.wind):
-            return
+        if len(case.log.wind):
+            self._send_wind(case, rows, frames)
+
+    def _send_wind(self, case: Viewed, rows: slice, frames: np.ndarray) -> None:
+        """frames: of the blades, with which the arrows go."""
+        root, alone = f"scene/{case.key}", len(self.cases) == 1  # the numbers of several would be a tangle
         if len(frames):
-            self._send_arrows(case, frames)
-        frames = self._frames(case, rows, WIND_RATE, MAX_FRAMES // (4 * len(self.cases)))
-        if len(frames):
-            self._send_speeds(case, frames)
-            shade = colours.on_scale(_disc_wind(case, frames), *self.wind_range, colours.WIND_SCALE)
-            self._columns(
-                f"scene/{case.key}/wind",
-                case.log.time[frames],
-                rr.Mesh3D.columns(vertex_colors=colours.packed(shade).reshape(-1)).partition(
-                    [shade.shape[1]] * len(frames)
-                ),
-            )
+            wind_scene.send_arrows(self._columns, case, root, frames, self.scale, alone)
+        slow = self._frames(case, rows, WIND_RATE, MAX_FRAMES // (4 * len(self.cases)))
+        if len(slow):
+            wind_scene.send_disc(self._columns, case, root, slow, *self.wind_range)
+        if len(slow) and alone:
+            wind_scene.send_numbers(self._columns, case, root, slow)
 
     def _send_turbine(self, case: Viewed, frames: np.ndarray) -> None:
         pose = case.geometry.pose(case.log.state[frames], case.skin.radius, TOWER_LEVELS, self.scale)
@@ -200,30 +181,6 @@ class Stage:
             self._mesh(
                 f"{root}/blade{blade + 1}", time, blades[:, blade], case.skin.triangles(), shade[:, blade]
             )
-
-    def _send_arrows(self, case: Viewed, frames: np.ndarray) -> None:
-        """The wind of each blade as an arrow that ends at the blade, in the colour of its curve."""
-        pose = case.geometry.pose(
-            case.log.state[frames], np.array([SPAN * case.geometry.radius]), scale=self.scale
-        )
-        ends, speed = pose.blades[:, :, 0], _blade_wind(case, frames)
-        vectors = np.zeros_like(ends)
-        vectors[..., 0] = ARROW_SCALE * np.nan_to_num(speed)
-        tails, each = (ends - vectors).reshape(-1, 3), [BLADES] * len(frames)
-        arrows = rr.Arrows3D.columns(origins=tails, vectors=vectors.reshape(-1, 3))
-        self._columns(f"scene/{case.key}/blade_wind", case.log.time[frames], arrows.partition(each))
-        if len(self.cases) == 1:
-            points = rr.Points3D.columns(positions=tails)
-            self._columns(f"scene/{case.key}/blade_wind/speed", case.log.time[frames], points.partition(each))
-
-    def _send_speeds(self, case: Viewed, frames: np.ndarray) -> None:
-        """What the arrows say in numbers, of one turbine: more would be a tangle. They change more slowly, to be read."""
-        if len(self.cases) > 1:
-            return
-        speeds = _blade_wind(case, frames).reshape(-1)
-        labels = [f"{speed:.1f} m/s" if np.isfinite(speed) else "" for speed in speeds]
-        told = rr.Points3D.columns(labels=labels).partition([BLADES] * len(frames))
-        self._columns(f"scene/{case.key}/blade_wind/speed", case.log.time[frames], told)
 
     def _mesh(
         self,
@@ -254,7 +211,7 @@ class Stage:
         if len(log.wind):
             for place, channel in enumerate(log.winds):
                 self._series(f"plots/wind/{channel.name}/{case.key}", time, log.wind[index, place])
-            for channel, values in zip(BLADE_WIND, _blade_wind(case, index).T, strict=True):
+            for channel, values in zip(BLADE_WIND, wind_scene.wind_of_blades(case, index).T, strict=True):
                 self._series(f"plots/wind/{channel.name}/{case.key}", time, values)
         for name, values in log.loads.items():
             self._series(f"plots/load/{name}/{case.key}", time, values[index] * read_unit(name)[1])
@@ -325,33 +282,6 @@ def _flap(case: Viewed) -> np.ndarray:
     return np.stack(
         [case.log.loads.get(f"blade{i}_root_flapwise_moment", missing) for i in (1, 2, 3)], axis=1
     )
-
-
-def _signals(case: Viewed, rows: Any) -> np.ndarray:
-    """(rows, 3 + 2 M) speed, shears and harmonics, without what else a wind may have."""
-    felt = [c in (*channels.WIND_SIGNALS, *channels.WIND_HARMONICS) for c in case.log.winds]
-    return case.log.wind[rows][:, felt]
-
-
-def _disc_wind(case: Viewed, rows: Any) -> np.ndarray:
-    """(rows, points) wind on the rotor disc [m/s]; of a slice some rows."""
-    if not len(case.log.wind):
-        return np.empty((0, 1))
-    y, z = shapes.disc_points(case.geometry)[0].T
-    wind = _signals(case, rows)
-    if isinstance(rows, slice):
-        wind = wind[:: max(1, len(case.log.wind) // 500)]
-    return local_wind(wind, y, z, case.geometry.radius)
-
-
-def _blade_wind(case: Viewed, rows: np.ndarray) -> np.ndarray:
-    """(rows, 3) wind at each blade [m/s]."""
-    return blade_wind(_signals(case, rows), case.log.state[rows, AZIMUTH])
-
-
-def _disc_x(case: Viewed) -> float:
-    """A plane behind the nacelle [m]: seen from upwind, the blades keep their own colours in front of it."""
-    return 14.0
 
 
 def _range(values: Sequence[np.ndarray]) -> tuple[float, float]:
