@@ -11,9 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.rotor import SQUARE
 
 HEADER = 8  # first tip-speed ratio, cells per unit, padding to one cache line
 INTERPOLATIONS = ("cubic", "bilinear")
+
+# How a load answers to an azimuthal harmonic of the wind, whose amplitude is averaged with the flap moment's weight (mean radius 0.71).
+# SWING: loads are no straight lines over the wind, their slope is largest where a turbine operates: the slope at the mean makes 4 to 5 %
+# more of OpenFAST's field at 8 m/s than blade elements that see it point by point. The secant over sqrt(3) standard deviations
+# is the best line for a Gaussian wind (Gauss-Hermite); a blade feels 0.13 V at 8 m/s and 0.11 V at 18 m/s (class B).
+# Thrust (mean radius 0.63), bending (0.70) and the flap mode (0.79) answer as their own weights would have it. The tangential force (0.58)
+# would be a fifth smaller then; it stays, because the lateral turbulence, which drives the tower sideways, is left out.
+SWING, SLOPE = 0.2, 1e-4
+OF_THEIR_OWN_RADIUS = ("thrust", "bending", "flap")
+REACH = (0.7, 1.2)
 
 
 @dataclass(frozen=True)
@@ -66,21 +77,45 @@ class AeroTables:
         return CubicSpline(self.pitch, stack, axis=1)(pitch)
 
     def _coefficient(self, name: str) -> NDArray[np.float64]:
-        """(n, k) of a table, zero without one; `X_w`, by a wind that is the same all along the blade, from the table X.
-
-        A load is rho/6 A V^2 X(lambda), so that at a fixed rotor speed d/dV gives rho/6 A V (2 X - lambda X').
-        """
+        """(n, k) of a table, zero without one; `X_w`, by an azimuthal harmonic of the wind, from the tables X and X_kappa."""
         shape = (len(self.tip_speed_ratio), len(self.pitch))
         if name in self.coefficients or not name.endswith("_w"):
             return self.coefficients.get(name, np.zeros(shape))
-        values = self.coefficients.get(name.removesuffix("_w"), np.zeros(shape))
-        if self.interpolation == "bilinear":
-            slope = np.gradient(values, self.tip_speed_ratio, axis=0)
-        else:
-            from scipy.interpolate import CubicSpline
+        load = name.removesuffix("_w")
+        if load not in self.coefficients:
+            return np.zeros(shape)
+        if load not in OF_THEIR_OWN_RADIUS:
+            return self._by_wind(load, SLOPE)
+        return self._by_wind(load, SWING) * self._reach(load)
 
-            slope = CubicSpline(self.tip_speed_ratio, values)(self.tip_speed_ratio, 1)
-        return np.asarray(2 * values - self.tip_speed_ratio[:, None] * slope)
+    def _by_wind(self, load: str, share: float) -> NDArray[np.float64]:
+        """Change of a load by the wind of the whole blade at a fixed rotor speed: secant over a swing of `share` of the wind, (n, k).
+
+        A load is rho/6 A V^2 X(lambda); over no swing at all this is rho/6 A V (2 X - lambda X').
+        """
+        ratio, values = self.tip_speed_ratio, self.coefficients[load]
+
+        def at(wind: float) -> NDArray[np.float64]:
+            place = np.clip(ratio / wind, ratio[0], ratio[-1])
+            if self.interpolation == "bilinear":
+                return wind**2 * np.stack([np.interp(place, ratio, column) for column in values.T], axis=1)
+            return np.asarray(wind**2 * spline(place))
+
+        from scipy.interpolate import CubicSpline
+
+        spline = CubicSpline(ratio, values)
+        return (at(1 + share) - at(1 - share)) / (2 * share)
+
+    def _reach(self, load: str) -> NDArray[np.float64]:
+        """Mean radius at which a load feels the wind over that of the weight that a harmonic's amplitude is made with, (n, k)."""
+        linear = self.coefficients.get(f"{load}_kappa")
+        if linear is None:
+            return np.ones((len(self.tip_speed_ratio), len(self.pitch)))
+        radii, density = (np.asarray(x) for x in self.span_weight or SQUARE)
+        mean_radius = np.trapezoid(radii * density, radii) / np.trapezoid(density, radii)
+        with np.errstate(divide="ignore", invalid="ignore"):  # where a load stalls, both change their signs
+            found = linear / self._by_wind(load, SLOPE) / mean_radius
+        return np.clip(np.nan_to_num(found, nan=1.0), *REACH)
 
     def cells(self, pitch: float, names: Sequence[str]) -> NDArray[np.float64]:
         """Flat array for the kernels: header, then per cell the coefficients 1, u, u^2, u^3 of all names side by side.
