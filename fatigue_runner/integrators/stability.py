@@ -10,6 +10,7 @@ import numpy as np
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators.ensemble import Ensemble, Integrator, simulate
 from fatigue_runner.integrators.methods import method as find_method
+from fatigue_runner.turbine.turbine import CONTROLLED
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
@@ -33,8 +34,8 @@ def stability_limit(turbine: Turbine, method: str, wind: float | None = None, pi
     growth = find_method(method).growth
     if growth(np.zeros(1, complex)) is None:
         return min(_tried_limit(turbine, method, v, pitch) for v in (TRIED_AT if wind is None else (wind,)))
-    if wind is None and turbine.layout.first_order:
-        # a controller pitches above rated: other modes than below
+    if wind is None and turbine.operation == CONTROLLED:
+        # it pitches above rated: other modes than below
         return min(stability_limit(turbine, method, v, pitch) for v in OPERATED_AT)
     wind = TRIED_AT[0] if wind is None else wind
     values = np.linalg.eigvals(linearised(turbine, wind, pitch))

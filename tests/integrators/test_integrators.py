@@ -291,6 +291,11 @@ def test_an_unknown_method_is_refused_with_the_nearest_one():
 # --- stability ----------------------------------------------------------------------------------------------------
 
 
+def test_the_stability_limit_under_the_torque_law_alone_is_found_where_the_turbine_can_stay(turbine):
+    """It has no steady rotation at 18 m/s, where a turbine with a pitch controller is looked at, too."""
+    assert stability_limit(turbine.operated("torque-law"), "rk4") > 0.05
+
+
 @pytest.mark.parametrize(
     "name", [n for n in METHODS if not isinstance(method(n), ExponentialRungeKutta | ExponentialAdams)]
 )
