@@ -47,7 +47,10 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class FirstOrder:
-    """A state with a first derivative only; `nudge` as for a coordinate."""
+    """A state with a first derivative only; `nudge` as for a coordinate.
+
+    In a unit in which it stays well below 1e4: beyond, a case counts as diverged (`integrators.vectors`).
+    """
 
     signal: Channel
     nudge: float = 1e-4

@@ -90,6 +90,11 @@ class Corrector:
         refusal = self.binding.refusal(turbine, method, step)
         if not refusal and turbine.layout.names != self.map.layout.names:
             refusal = f"was trained for a turbine of {self.map.layout.size} states, this one has {turbine.layout.size}; train one"
+        seen, there = (", ".join(c.name for c in layout.wind) for layout in (self.map.layout, turbine.layout))
+        if not refusal and seen != there:
+            refusal = (
+                f"was trained for the wind's {seen}, the equations of this turbine know {there}; train one"
+            )
         if refusal:
             raise CorrectorError(f"corrector {self.name} {refusal}")
 

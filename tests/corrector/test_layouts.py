@@ -56,6 +56,16 @@ def test_it_is_refused_on_a_turbine_of_other_states():
         controlled().bind(turbine(), "heun", 0.02)
 
 
+def test_it_is_refused_on_a_turbine_whose_equations_know_another_wind():
+    layout = T2B1I1CG.extended(wind=CONTROLLED.wind[3:])
+    weights = np.zeros((layout.size, len(features.stage_aware(layout, 2))))
+    learned = replace(trained(), map=StageMap(weights, layout=layout))
+    with pytest.raises(
+        CorrectorError, match="horizontal_shear, wind_cos_2, the equations of this turbine know wind_speed"
+    ):
+        learned.bind(turbine(), "heun", 0.02)
+
+
 def test_weights_and_guards_of_another_width_are_refused():
     with pytest.raises(CorrectorError, match="do not fit heun's features"):
         replace(controlled(), map=StageMap(trained().map.linear, layout=CONTROLLED))

@@ -117,6 +117,10 @@ class Printer(PythonCodePrinter):
     def _print_Rational(self, expr):
         return repr(float(expr))
 
+    def _print_Float(self, expr):
+        # all digits, not sympy's fifteen
+        return repr(float(expr))
+
     def _print_Integer(self, expr):
         return f"{int(expr)}.0"
 
