@@ -43,12 +43,15 @@ def turbine(name: str = "nrel5mw") -> Any:
     return fr.load_turbine(name)
 
 
+# the wind that older trees have: its mean and linear shears
+LINEAR: dict[str, Any] = (
+    {"harmonics": 1} if "harmonics" in inspect.signature(fr.TurbulentWind).parameters else {}
+)
+
+
 def turbulent(duration: float, seed: int = 1, mean: float = 8.0) -> Any:
     # with the sizes that older trees assume for every turbine
-    sizes: Any = {"rotor_radius": 63.0, "hub_height": 90.0}
-    # and the wind that they have: its mean and linear shears
-    if "harmonics" in inspect.signature(fr.TurbulentWind).parameters:
-        sizes["harmonics"] = 1
+    sizes: Any = {"rotor_radius": 63.0, "hub_height": 90.0, **LINEAR}
     return fr.TurbulentWind(mean, intensity=0.14, seed=seed, duration=duration, **sizes)
 
 
@@ -193,7 +196,13 @@ COMMON = {"duration": 20, "reference": {"method": "rk7", "step": 0.01}}
 # 12 winds each: the second group of lanes is padded
 CAMPAIGNS: dict[str, dict[str, Any]] = {
     "turbulent": {
-        "wind": {"type": "turbulent", "speeds": [6, 8, 10], "seeds": 4, "intensity": 0.14},
+        "wind": {
+            "type": "turbulent",
+            "speeds": [6, 8, 10],
+            "seeds": [1, 2, 3, 4],
+            "intensity": 0.14,
+            **LINEAR,
+        },
         "integrators": [{"method": m, "step": STEPS[m]} for m in ("heun", "rk4", "abm4", "etdrk4")]
         + CORRECTED,
         "discard": 2,
