@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -122,6 +123,53 @@ def modes() -> Iterator[Check]:
             yield Check(section, f"{name}: damping ratio", OPENFAST, their_damping, 100 * damping, "%")
 
 
+WORDS = {
+    "RootMyb1": "flap root moment", "RootMxb1": "edge root moment",
+    "TwrBsMyt": "tower-base fore-aft moment", "TwrBsMxt": "tower-base side-side moment",
+}  # fmt: skip
+SPEEDS = (8.0, 18.0)
+
+
+def openfast_loads() -> Any:
+    """The comparison of the tests; None where OpenFAST's results are not here."""
+    tests = Path(__file__).resolve().parents[1] / "tests"
+    sys.path[:0] = [str(tests / "wind"), str(tests)]
+    import openfast_loads as found
+
+    return found if found.DATA.is_dir() else None
+
+
+def shear() -> Iterator[Check]:
+    """Loads in steady power-law shear: all amplitudes that three equal blades have; a tower has only every third."""
+    loads = openfast_loads()
+    for speed in SPEEDS if loads else ():
+        section = f"Steady power-law shear 0.2 at {speed:g} m/s, nrel5mw under control"
+        for p in loads.amplitudes(speed):
+            if p.theirs > 1e-3 * abs(p.mean) and (p.channel.startswith("Root") or p.what == "3P"):
+                yield Check(
+                    section, f"{WORDS[p.channel]}, {p.what} amplitude", OPENFAST, p.theirs, p.ours, "kN·m"
+                )
+        for p in loads.steady_equivalents(speed):
+            if (
+                p.channel != "TwrBsMxt"
+            ):  # OpenFAST's holds the start's side-side swing, which decays in minutes
+                name = f"{WORDS[p.channel]}, DEL {p.what}"
+                yield Check(section, name, OPENFAST, p.theirs, p.ours, "kN·m")
+
+
+def turbulence() -> Iterator[tuple[str, ...]]:
+    """Damage-equivalent loads in OpenFAST's own fields: OpenFAST's, and ours over it with 1, 3 and 6 harmonics."""
+    loads = openfast_loads()
+    for speed in SPEEDS if loads else ():
+        runs = [list(loads.field_equivalents(speed, harmonics)) for harmonics in (1, 3, 6)]
+        for pairs in zip(*runs, strict=True):
+            name = f"{speed:g} m/s, {WORDS[pairs[0].channel]}, {pairs[0].what}"
+            yield name, f"{pairs[0].theirs:.6g} kN·m", *(f"{p.ratio:.3f}" for p in pairs)
+        theirs, ours = loads.rotor_speed(speed, 6)
+        told = (f"{mean:.2f}, {deviation:.2f} rpm" for mean, deviation in (theirs, ours))
+        yield f"{speed:g} m/s, rotor speed: mean, standard deviation", next(told), "", "", next(told)
+
+
 def equations() -> Iterator[tuple[str, str, str]]:
     """(check, against what, result) of the equations of motion, with the helpers of the tests."""
     tests = Path(__file__).resolve().parents[1] / "tests"
@@ -176,7 +224,7 @@ def equations() -> Iterator[tuple[str, str, str]]:
 
 
 def checks() -> list[Check]:
-    return [check for part in (structure, rotor, operation, modes) for check in part()]
+    return [check for part in (structure, rotor, operation, modes, shear) for check in part()]
 
 
 def main() -> int:
@@ -196,6 +244,14 @@ def main() -> int:
             print("| " + " | ".join((c.name, *values)) + " |")
         else:
             print(f"  {c.name:45s}{values[0]:>18s}{values[1]:>18s}{values[2]:>10s}")
+    print(
+        "\n### Turbulence, OpenFAST's own TurbSim fields, nrel5mw under control\n\n"
+        "| damage-equivalent load, 600 s | OpenFAST 5.0 | ours over it, M = 1 | M = 3 | M = 6 |\n|---|---|---|---|---|"
+        if markdown
+        else "\nTurbulence: OpenFAST's load, ours over it with 1, 3 and 6 harmonics"
+    )
+    for cells in turbulence():
+        print("| " + " | ".join(cells) + " |" if markdown else "  " + "; ".join(cells))
     print(
         "\n## The equations themselves\n\n| check | against | result |\n|---|---|---|"
         if markdown
