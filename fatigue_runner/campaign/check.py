@@ -14,7 +14,7 @@ def check(resolved: Resolved) -> list[str]:
     """Sentences that a person should read before the run.
 
     Raises InputError, with the line, for a step above the stability limit, a corrector that does not fit, a method that cannot
-    take the campaign's pitch, and a channel to log that not every wind has.
+    take the campaign's pitch, a step that is too long for the wind's harmonics, and a channel to log that not every wind has.
     """
     _check_logged_channels(resolved)
     for integration in resolved.integrations:
@@ -48,9 +48,14 @@ class _Refused(Exception):
 
 
 def _check(integration: Integration, resolved: Resolved) -> None:
-    from fatigue_runner.integrators import stability_limit
+    from fatigue_runner.integrators import refuse_unresolved, stability_limit
 
     built = integration.build()
+    try:
+        for wind in resolved.winds:
+            refuse_unresolved(resolved.turbine, wind.source, wind.initial, integration.step)
+    except InputError as error:
+        raise _Refused(str(error), "step") from None
     if isinstance(resolved.campaign.pitch, Pitch) and (built.corrector or not built.found.varying_pitch):
         what = f"corrector {integration.corrector}" if built.corrector else integration.method
         raise _Refused(

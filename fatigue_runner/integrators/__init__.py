@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     )
     from fatigue_runner.integrators.methods import METHODS, method
     from fatigue_runner.integrators.stability import stability_limit
+    from fatigue_runner.integrators.wind_steps import refuse_unresolved
 
 __all__ = [
     "ENHANCED",
@@ -30,6 +31,7 @@ __all__ = [
     "Ensemble",
     "Integrator",
     "method",
+    "refuse_unresolved",
     "simulate",
     "stability_limit",
     "warm_up",
@@ -39,8 +41,14 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from fatigue_runner.integrators import ensemble, methods, stability
+    from fatigue_runner.integrators import ensemble, methods, stability, wind_steps
 
-    place: Any = {"METHODS": methods, "method": methods, "stability_limit": stability}.get(name, ensemble)
+    elsewhere = {
+        "METHODS": methods,
+        "method": methods,
+        "stability_limit": stability,
+        "refuse_unresolved": wind_steps,
+    }
+    place: Any = elsewhere.get(name, ensemble)
     globals()[name] = value = getattr(place, name)
     return value

@@ -15,6 +15,7 @@ from fatigue_runner.integrators.contract import Method
 from fatigue_runner.integrators.methods import METHODS
 from fatigue_runner.integrators.methods import method as find_method
 from fatigue_runner.integrators.pitch import PitchSeries
+from fatigue_runner.integrators.wind_steps import refuse_unresolved
 from fatigue_runner.naming import integrator_id, integrator_label
 
 if TYPE_CHECKING:
@@ -113,13 +114,16 @@ class Ensemble:
 def simulate(ensemble: Ensemble, integrator: Integrator) -> list[Trajectory]:
     """One trajectory per case, in the order of the winds; a case's result does not depend on the others.
 
-    The last step ends at or after the duration. Raises InputError for impossible numbers and for a corrector that does not fit.
+    The last step ends at or after the duration. Raises InputError for impossible numbers, for a corrector that does not fit and for a
+    step that is too long for the harmonics of a wind.
     """
     e, found = ensemble, integrator.found
     shape = (len(e), e.turbine.layout.size)
     initial = np.asarray(e.initial, float)
     if initial.shape != shape:
         raise InputError(f"initial must have shape {shape}, one state per wind, got {initial.shape}")
+    for wind, state in zip(e.winds, initial, strict=True):
+        refuse_unresolved(e.turbine, wind, state, integrator.step)
     blocks: dict[bool, Block] = {}
     out: list[Any] = [None] * len(e)
     for chosen in e.groups():

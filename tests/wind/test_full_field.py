@@ -35,11 +35,11 @@ def uniform(path: Path, *rows: str) -> Path:
 def call(tmp_path, monkeypatch, capfd):
     """call(wind, **campaign) -> (exit code, what was printed as an error without the folder) of `fatigue-runner run`."""
 
-    def of(wind: str, turbine: str = "nrel5mw", duration: float = 4.0) -> tuple[int, str]:
+    def of(wind: str, turbine: str = "nrel5mw", duration: float = 4.0, step: float = 0.05) -> tuple[int, str]:
         monkeypatch.chdir(tmp_path)
         (tmp_path / "c.yaml").write_text(
             f"name: a\nturbine: {turbine}\nduration: {duration}\nreference: null\nlog: {{enabled: false}}\nworkers: 1\n"
-            f"integrators: [{{method: rk4, step: 0.05}}]\nwind:\n  type: full-field\n{wind}\n"
+            f"integrators: [{{method: rk4, step: {step}}}]\nwind:\n  type: full-field\n{wind}\n"
         )
         monkeypatch.setattr(sys, "argv", ["fatigue-runner", "run", "c.yaml", "--out", str(tmp_path / "out")])
         with pytest.raises(SystemExit) as ended:
@@ -256,3 +256,13 @@ def test_a_field_shorter_than_the_run_is_refused(call, tmp_path):
     code, told = call("  files: a.bts", duration=40)
     assert code == 2
     assert "c.yaml:10: the wind field-a is 10.6667 s long" in told and "the campaign runs 40 s" in told
+
+
+def test_a_step_too_long_for_the_harmonics_is_refused_with_the_integrators_line(call, tmp_path):
+    plain(tmp_path)
+    code, told = call("  files: a.bts\n  harmonics: 16", step=0.2)
+    assert code == 2
+    assert (
+        told.startswith("error: c.yaml:7: wind field-a has 16 azimuthal harmonics")
+        and "a step of at most" in told
+    )

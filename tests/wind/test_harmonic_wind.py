@@ -10,6 +10,7 @@ from field_files import some_field, write_bts
 from simulating import simulate_block
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.integrators import Ensemble, Integrator, refuse_unresolved, simulate
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.aerodynamics import LOAD_NAMES, rotor_loads
 from fatigue_runner.turbine.file import read_turbine_file
@@ -202,3 +203,30 @@ def test_a_full_field_says_how_strong_its_hub_point_is_and_not_its_mean_over_the
         told[1] == pytest.approx(wind.at(np.arange(500) * 0.1)[:, 0].std(), rel=0.05)
         and told[1] < 0.6 * point
     )
+
+
+def test_a_step_with_fewer_than_two_steps_in_a_period_of_the_highest_harmonic_is_refused(turbine):
+    """At 12.1 rpm the sixteenth harmonic comes by every 0.31 s."""
+    state = turbine.operating_point(10.0)
+    state[14] = 12.1 * np.pi / 30
+    wind = TurbulentWind(12.0, 0.1, harmonics=16).on(turbine.rotor)
+    longest = 60 / 12.1 / 16 / 2
+    refuse_unresolved(turbine, wind, state, longest * 0.999)
+    with pytest.raises(InputError) as told:
+        refuse_unresolved(turbine, wind, state, 0.2)
+    assert "16 azimuthal harmonics, but at 12.1 rpm a step of 200 ms has fewer than 2 steps" in str(
+        told.value
+    )
+    assert "take at most 12 harmonics, or a step of at most 154 ms" in str(told.value)
+    refuse_unresolved(turbine, TurbulentWind(12.0, 0.1, harmonics=12).on(turbine.rotor), state, 0.2)
+    refuse_unresolved(turbine, TurbulentWind(12.0, 0.1, harmonics=1), state, 1.0)
+    # a rotor at rest will turn with tip-speed ratio 7.5: 12 m/s are 13.7 rpm
+    with pytest.raises(InputError, match=r"at 13\.7 rpm"):
+        refuse_unresolved(turbine, wind, np.zeros(16), 0.2)
+
+
+def test_whoever_simulates_refuses_such_a_step(turbine):
+    wind = TurbulentWind(8.0, 0.1, harmonics=16, duration=10.0)
+    ensemble = Ensemble(turbine, [ConstantWind(8.0), wind], np.stack([turbine.operating_point(8.0)] * 2), 4.0)
+    with pytest.raises(InputError, match="take at most 7 harmonics, or a step of at most 205 ms"):
+        simulate(ensemble, Integrator("etdrk4", 0.45))
