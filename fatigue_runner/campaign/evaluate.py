@@ -37,6 +37,8 @@ def discarded(trajectory: Trajectory, discard: float) -> Trajectory:
         state=trajectory.state[first:],
         wind=trajectory.wind[first:],
         loads={name: series[first:] for name, series in trajectory.loads.items()},
+        pitch=trajectory.pitch[first:],
+        control={name: series[first:] for name, series in trajectory.control.items()},
     )
 
 

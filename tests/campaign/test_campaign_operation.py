@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fatigue_runner import run_campaign
+from fatigue_runner import run_campaign, simulate
+from fatigue_runner.campaign.evaluate import discarded
 from fatigue_runner.campaign.plan import make_plan
 from fatigue_runner.errors import InputError
 from fatigue_runner.logbook import read_log
+from fatigue_runner.wind import ConstantWind
 
 CAMPAIGN = {
     "name": "operation",
@@ -58,3 +60,11 @@ def test_a_second_run_keeps_what_is_finished(results):
 def test_operations_that_cannot_be_are_refused_in_one_sentence(change, message):
     with pytest.raises(InputError, match=message):
         make_plan({**CAMPAIGN, **change})
+
+
+def test_what_is_discarded_is_discarded_of_every_series(nrel5mw):
+    run = simulate(nrel5mw, ConstantWind(16.0), "rk4", 0.05, 4.0, operation="controlled")
+    kept = discarded(run, 1.0)
+    lengths = {len(kept.time), len(kept.state), len(kept.wind), len(kept.pitch)}
+    lengths |= {len(series) for series in (*kept.loads.values(), *kept.control.values())}
+    assert lengths == {61} and len(kept.control) == 2
