@@ -18,6 +18,7 @@ from fatigue_runner.wind import (
     GustWind,
     SeriesWind,
     StepWind,
+    TowerInfluence,
     TurbulentWind,
     WindSource,
 )
@@ -32,6 +33,7 @@ __all__ = [
     "PitchSeries",
     "SeriesWind",
     "StepWind",
+    "TowerInfluence",
     "TurbulentWind",
     "correctors",
     "damage_equivalent_load",

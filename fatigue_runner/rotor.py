@@ -13,7 +13,8 @@ class Rotor:
     """radius: R of the tip-speed ratio and the shears, the tips' distance from the shaft; hub_height above the ground; both [m].
 
     weight: (r/R, density), linear between, of integral one: how much wind at each radius moves the blade's root flap moment.
-    apex: of the rotor, downwind of the tower's axis [m]; tilt of the shaft [rad], negative lifts the upwind end.
+    apex: of the rotor, downwind of the tower's axis [m]; tilt of the shaft [rad], negative lifts the upwind end; cone of the blades [rad],
+    negative turns the tips upwind; tower: (height above ground, diameter) pairs [m], rising; none where nobody gave them.
     """
 
     radius: float
@@ -21,3 +22,5 @@ class Rotor:
     weight: tuple[tuple[float, ...], tuple[float, ...]] = SQUARE
     apex: float = 0.0
     tilt: float = 0.0
+    cone: float = 0.0
+    tower: tuple[tuple[float, float], ...] = ()

@@ -156,7 +156,7 @@ def _winds(
     """Every wind with its start; those of one mean wind share it."""
     place = Place(source, ("wind",))
     winds, starts = [], _Starts(campaign, turbine, pitch)
-    for named in campaign.wind.realisations(Site(turbine.rotor, campaign.duration, place)):
+    for named in campaign.wind.winds(Site(turbine.rotor, campaign.duration, place)):
         where = place.where(*named.path)
         blowing = _blowing(named, turbine.rotor, campaign.duration, where)
         try:

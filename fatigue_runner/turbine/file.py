@@ -6,6 +6,7 @@ lists are replaced. What is checked is the whole; what is wrong is told with the
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -232,6 +233,18 @@ class Tower(Member):
     fore_aft_mode: list[float] = Field(min_length=1)
     side_side_mode: list[float] = Field(min_length=1)
     mass_elements: int = Field(ge=1)
+    diameters: list[list[float]] | None = Field(default=None, min_length=2)
+
+    @field_validator("diameters")
+    @classmethod
+    def _rise(cls, rows: list[list[float]] | None) -> list[list[float]] | None:
+        for number, row in enumerate(rows or (), start=1):
+            if len(row) != 2 or not row[1] > 0:
+                raise problem(f"row {number} must be a height and a positive diameter in m; got {row!r:.60}")
+        heights = [row[0] for row in rows or ()]
+        if any(high <= low for low, high in itertools.pairwise(heights)):
+            raise problem(f"heights must rise from row to row; got {heights!r:.60}")
+        return rows
 
 
 class Aerodynamics(Section):

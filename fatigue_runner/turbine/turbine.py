@@ -36,7 +36,8 @@ OPERATIONS = (FIXED, TORQUE_LAW, CONTROLLED)
 class Turbine:
     """One turbine of the type T2B1i1cG. `parameters` by `equations.PARAMETERS` [SI], at zero pitch.
 
-    control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it.
+    control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it;
+    tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Turbine:
     dynamics: Dynamics = UNCONTROLLED
     control: Mapping[str, Any] | None = None
     operation: str = FIXED
+    tower: tuple[tuple[float, float], ...] = ()
 
     @property
     def layout(self) -> Layout:
@@ -133,9 +135,10 @@ class Turbine:
     def rotor(self) -> Rotor:
         """What a wind source needs to know of the turbine."""
         p = self.parameters
-        tilt = float(np.arctan2(p["sin_tilt"], p["cos_tilt"]))
+        tilt, cone = (float(np.arctan2(p[f"sin_{name}"], p[f"cos_{name}"])) for name in ("tilt", "cone"))
         weight = self.tables.span_weight or SQUARE
-        return Rotor(self.rotor_radius, self.hub_height, weight, p["overhang"] * p["cos_tilt"], tilt)
+        apex = p["overhang"] * p["cos_tilt"]
+        return Rotor(self.rotor_radius, self.hub_height, weight, apex, tilt, cone, self.tower)
 
     @property
     def gearbox_ratio(self) -> float:
@@ -318,7 +321,8 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     # a law without regions has no rated speed that a pitch could hold
     given = data.get("control") if data["generator"]["law"] == "regions" else None
     control = Control.model_validate(given).model_dump() if given else None
-    return Turbine(name, parameters, tables, str(data.get("description", "")), control=control)
+    tower = tuple((float(height), float(diameter)) for height, diameter in data["tower"].get("diameters", ()))
+    return Turbine(name, parameters, tables, str(data.get("description", "")), control=control, tower=tower)
 
 
 def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:

@@ -18,6 +18,7 @@ from fatigue_runner.wind.series import SeriesWind
 from fatigue_runner.wind.source import SOURCES, WindSource, make_wind
 from fatigue_runner.wind.stack import stack_cells
 from fatigue_runner.wind.steps import StepWind
+from fatigue_runner.wind.tower import TowerInfluence
 from fatigue_runner.wind.turbulence import TurbulentWind
 
 for _module in iter_modules(__path__):
@@ -30,6 +31,7 @@ __all__ = [
     "GustWind",
     "SeriesWind",
     "StepWind",
+    "TowerInfluence",
     "TurbulentWind",
     "WindSource",
     "make_wind",

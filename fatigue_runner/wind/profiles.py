@@ -82,6 +82,21 @@ class Logarithmic:
         return np.log(height / self.roughness_length) / math.log(reference_height / self.roughness_length)
 
 
+@dataclass(frozen=True)
+class LinearShear:
+    """1 + kappa (z - z_ref) / R with the rotor radius R [m]: the linear shear of the wind signals."""
+
+    kappa: float
+    radius: float
+
+    @property
+    def words(self) -> str:
+        return f"linear shear, {self.kappa:g} over the rotor's radius"
+
+    def factor(self, height: np.ndarray, reference_height: float) -> np.ndarray:
+        return 1 + self.kappa * (np.asarray(height) - reference_height) / self.radius
+
+
 def profile_amplitudes(
     profile: Profile,
     hub_height: float,

@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 from pydantic_core import PydanticCustomError
 
-from fatigue_runner.errors import did_you_mean
+from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, problem
 from fatigue_runner.inputs.source import Place
 from fatigue_runner.rotor import Rotor
@@ -38,7 +38,8 @@ class Realisation:
     """One wind of a campaign: its name in case ids, and plain values that make it on any worker.
 
     parameters: of `make_wind`; path: the keys that it came from, below the section; mean_speed [m/s] where it is known before the
-    wind is made; contents {parameter: hash} of files: what is in them decides the figures, not where they lie.
+    wind is made; contents {parameter: hash} of files: what is in them decides the figures, not where they lie; tower: the diameters
+    of the tower in the blades' way, none where it does not count.
     """
 
     id: str
@@ -47,10 +48,13 @@ class Realisation:
     path: tuple[str | int, ...] = ()
     mean_speed: float | None = None
     contents: tuple[tuple[str, str], ...] = ()
+    tower: tuple[tuple[float, float], ...] = ()
 
     def build(self, rotor: Rotor | None = None) -> WindSource:
         """The wind source as it blows on this rotor, or on none yet; raises InputError for parameters that it refuses."""
         wind = make_wind(self.kind, **dict(self.parameters))
+        if self.tower:
+            wind = make_wind("tower-influence", wind=wind)
         return wind if rotor is None else wind.on(rotor)
 
     @property
@@ -62,15 +66,20 @@ class Realisation:
     @property
     def identity(self) -> list[Any]:
         """What decides the wind, as plain values to be hashed."""
-        return [self.kind, [list(pair) for pair in (dict(self.parameters) | dict(self.contents)).items()]]
+        given = [list(pair) for pair in (dict(self.parameters) | dict(self.contents)).items()]
+        return [self.kind, given, list(self.tower)] if self.tower else [self.kind, given]
 
 
 class WindSection(Section):
-    """The base of all wind sections; `kind` is what the file's `type` says."""
+    """The base of all wind sections; `kind` is what the file's `type` says.
+
+    tower_influence   whether the tower takes from the wind of the blades that pass it (default false)
+    """
 
     kind: ClassVar[str]
 
     type: str = DEFAULT
+    tower_influence: bool = False
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -81,6 +90,18 @@ class WindSection(Section):
     def realisations(self, site: Site) -> Iterable[Realisation]:
         """Every wind that the section means, in a stated order. Raises InputError with the place, `site.place.where(key)`."""
         raise NotImplementedError
+
+    def winds(self, site: Site) -> Iterable[Realisation]:
+        """The realisations, with the turbine's tower in the blades' way where the section says so."""
+        if not self.tower_influence:
+            yield from self.realisations(site)
+            return
+        if not site.rotor.tower:
+            raise InputError(
+                f"{site.place.where('tower_influence')}: the turbine's file has no tower diameters; add `diameters` to its `tower`"
+            )
+        for found in self.realisations(site):
+            yield replace(found, id=f"{found.id}_tower", tower=site.rotor.tower)
 
     def resolved(self, place: Place) -> dict[str, Any]:
         """The section as it can be read again from anywhere: as it was given, paths made absolute."""
