@@ -1,4 +1,4 @@
-"""`fatigue-runner benchmark`: kernel, work-precision, paper, stability, logs."""
+"""`fatigue-runner benchmark`: kernel, work-precision, paper, stability, wind, logs, live."""
 
 from __future__ import annotations
 
@@ -201,6 +201,25 @@ def stability(
 
     result = measured.measure(seeds, duration, _say)
     typer.echo(speed("stability", result))
+    _write(result, json)
+
+
+@app.command()
+def wind(
+    repeats: Annotated[int, typer.Option("--repeats", min=1, help="Interleaved repeats of the runs.")] = 5,
+    json: Json = None,
+) -> None:
+    """What wind costs on one core: 66 ten-minute series, a full field on the rotor, evaluations with 1, 3 and 6 azimuthal harmonics.
+
+    Example:
+
+        fatigue-runner benchmark wind --json wind.json
+    """
+    from fatigue_runner.benchmark.pages import tables
+    from fatigue_runner.benchmark.speed import wind as measured
+
+    result = measured.measure(repeats)
+    console().print(tables.wind(result))
     _write(result, json)
 
 

@@ -216,6 +216,21 @@ def logs(result: dict[str, Any]) -> Any:
     return made
 
 
+def wind(result: dict[str, Any]) -> Any:
+    """The figures of `speed.wind.measure` as a rich table."""
+    from rich.table import Table as RichTable
+
+    made = RichTable(title=f"Wind on {result['turbine']}, one core")
+    series = f"{result['series']} series, s"
+    for heading in ("harmonics", series, "field on the rotor, s", "ns per evaluation", "ratio"):
+        made.add_column(heading, justify="right")
+    for row in result["harmonics"]:
+        seconds = f"{row['series_seconds']:.2f}", f"{row['field_seconds']:.2f}"
+        made.add_row(str(row["harmonics"]), *seconds, nanoseconds(row["evaluation"]), f"{row['ratio']:.2f}")
+    made.caption = "series of 600 s; field of 15 x 15 points, 660 s, read and projected; whole steps of rk4, 16 turbulent cases"
+    return made
+
+
 def live(result: dict[str, Any]) -> Any:
     """The figures of `speed.live.measure` as a rich table."""
     from rich.table import Table as RichTable
