@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -207,9 +208,11 @@ def test_ctrl_c_ends_with_130_leaves_no_worker_and_the_same_command_goes_on(tmp_
     campaign = tmp_path / "long.yaml"
     campaign.write_text(text.replace("name: quickstart", "name: long").replace("count: 12", "count: 200"))
     command = [sys.executable, "-m", "fatigue_runner", "run", str(campaign), "--out", str(tmp_path / "out")]
+    # a test run in the background may ignore SIGINT, which its children would inherit
+    listening = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=listening
+    )  # fmt: skip
     journal = tmp_path / "out" / "cases.jsonl"
     deadline = time.monotonic() + 300
     while time.monotonic() < deadline and not (journal.exists() and journal.stat().st_size):
