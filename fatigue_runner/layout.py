@@ -47,13 +47,15 @@ class Coordinate:
 
 @dataclass(frozen=True)
 class FirstOrder:
-    """A state with a first derivative only; `nudge` as for a coordinate.
+    """A state with a first derivative only; `nudge` as for a coordinate. Where a run begins elsewhere than in steady operation, it begins
+    with the value of the state `follows`, as a filter does that has seen it for long, or at zero.
 
     In a unit in which it stays well below 1e4: beyond, a case counts as diverged (`integrators.vectors`).
     """
 
     signal: Channel
     nudge: float = 1e-4
+    follows: str = ""
 
 
 @dataclass(frozen=True)

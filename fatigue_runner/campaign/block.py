@@ -39,7 +39,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class Job:
-    """One block: the cases to run, the references of their winds, the winds' states (16,) at t = 0 by id.
+    """One block: the cases to run, the references of their winds, the winds' states (size,) at t = 0 by id.
 
     logged: {case id: record} of the cases whose trajectory stands in a log already, so that it is read, not
     simulated.
@@ -132,7 +132,7 @@ def _read(job: Job, case: Case) -> Trajectory | None:
 def simulate(
     setup: Setup, integration: Integration, winds: Sequence[Any], initial: np.ndarray
 ) -> list[Trajectory]:
-    """All winds of a block with one integrator, from the states (n, 16)."""
+    """All winds of a block with one integrator, from the states (n, size)."""
     from fatigue_runner import integrators
 
     campaign = setup.campaign

@@ -30,7 +30,7 @@ HIGHEST_WIND_SPEED = 40.0
 
 @dataclass(frozen=True, eq=False)
 class ResolvedWind:
-    """One wind of the campaign: what names it, what blows, the state (16,) in which its cases start, and what one should know of it."""
+    """One wind of the campaign: what names it, what blows, the state (size,) in which its cases start, and what one should know of it."""
 
     named: Realisation
     source: WindSource

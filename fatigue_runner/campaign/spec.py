@@ -4,7 +4,8 @@ name            names the run folder; letters, digits, `.`, `_`, `-`
 turbine         `nrel5mw` (default), `t2b1i1cg` (the paper's: no tilt, no cone) or the path of a turbine YAML
 duration        simulated time of every case [s]
 output_rate     samples per second [Hz] of what is counted, compared and logged (default 50), at any step
-initial         state at t = 0: `operating-point` (default), `paper`, `paper-spinning`, or 16 numbers
+initial         state at t = 0: `operating-point` (default), `paper`, `paper-spinning`, or 16 numbers (a controller's states begin
+                as if these had been so for long)
 operation       who steers: `fixed` (default: the pitch below, torque of the momentary speed), `controlled` (the turbine's
                 controller: pitch and torque, 3 to 25 m/s), `torque-law` (its torque at fine pitch)
 pitch           with `operation: fixed`: blade pitch [deg], the same for all cases (default 0); or {time: [s], angle: [deg]}, a smooth curve

@@ -21,7 +21,7 @@ SPEED, INTEGRAL = "filtered_generator_speed", "speed_error_integral"
 INTEGRALS = (-1.0, 5.0, 15.0, 40.0, 80.0, 120.0, 150.0, 200.0, 250.0)
 
 _STATES = (
-    FirstOrder(Channel(SPEED, "rad/s", "filtered generator speed", "rpm", RPM), nudge=1e-3),
+    FirstOrder(Channel(SPEED, "rad/s", "filtered generator speed", "rpm", RPM), 1e-3, "generator_speed"),
     FirstOrder(Channel(INTEGRAL, "rad", "integral of the generator's speed error", "rad"), nudge=1e-3),
 )
 

@@ -23,9 +23,10 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 
 from fatigue_runner.corrector.binding import Binding, correctable
 from fatigue_runner.corrector.fit import relative_residual
-from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import TAG, Section, problem
+from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.section import TAG, Section, known_name, problem
 from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
+from fatigue_runner.wind.section import Harmonics
 
 if TYPE_CHECKING:
     from fatigue_runner.corrector.corrector import Corrector
@@ -110,9 +111,7 @@ class Recipe(Section):
     @field_validator("initial")
     @classmethod
     def _known_state(cls, value: str) -> str:
-        if value not in INITIAL_STATES:
-            raise problem(f"{value!r} is not known{did_you_mean(value, INITIAL_STATES)}")
-        return value
+        return known_name(value, INITIAL_STATES)
 
     @field_validator("method")
     @classmethod
@@ -198,7 +197,7 @@ class Winds(Section):
     vertical_shear: list[float] = Field(default=[0.0])
     horizontal_shear: list[float] = Field(default=[0.0])
     seed: int = Field(default=0, ge=0)
-    harmonics: int = Field(default=1, ge=0, le=16)
+    harmonics: Harmonics = 1
     duration: float = Field(default=120.0, ge=2, le=1e4)
 
     @property

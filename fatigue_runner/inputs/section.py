@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -35,6 +36,14 @@ _WORDS = {
 def problem(message: str, key: str | None = None, **more: Any) -> PydanticCustomError:
     """An error inside a validator: one sentence; `key` is the key of the section that it is about."""
     return PydanticCustomError("problem", "{sentence}", {"sentence": message, "key": key, **more})
+
+
+def known_name(name: Any, names: Collection[str], spelled: str | None = None, key: str | None = None) -> str:
+    """The name if it is one of `names`, else the problem with the nearest one; spelled: as the nearest is looked for."""
+    if not isinstance(name, str) or name not in names:
+        near = did_you_mean(str(name) if spelled is None else spelled, names)
+        raise problem(f"{name!r} is not known{near}", key=key)
+    return name
 
 
 class Section(BaseModel):

@@ -16,25 +16,28 @@ def initial_state(turbine: Any, initial: str | Any, wind: Any, pitch: float = 0.
     `operating-point` is that of the wind's mean speed and shears. `paper` is the literal state of
     arXiv:2504.05493: all zero but a rotor azimuth of pi/3, which leaves the generator 60 degrees behind
     and winds the shaft up. `paper-spinning` is what was probably meant, since it fits the paper's
-    figure: the rotor turns at pi/3 rad/s, the generator with it; states of first order begin at zero in both. A sequence is the
-    state itself.
+    figure: the rotor turns at pi/3 rad/s, the generator with it. A sequence is the state itself, or positions and velocities
+    alone. States of first order that are not given begin as `FirstOrder` says.
     Raises InputError where the turbine has no operating point at this wind.
     """
-    if not isinstance(initial, str):
-        return np.array(initial, dtype=np.float64)
     if initial == "operating-point":
         label = wind.label
         shears = label.get("vertical_shear") or 0.0, label.get("horizontal_shear") or 0.0
         return np.asarray(turbine.operating_point(wind.mean_speed, *shears, pitch=pitch), dtype=np.float64)
     layout = turbine.layout
     state = np.zeros(layout.size)
-    state[layout.rotor] = math.pi / 3
+    if not isinstance(initial, str):
+        state[: len(initial)] = initial
+        if len(initial) == layout.size:
+            return state
+    else:
+        state[layout.rotor] = math.pi / 3
     if initial == "paper-spinning":
         generator = turbine.parameters["g_ratio"] * math.pi / 3
         state[layout.generator] = generator
         state[layout.rotor_speed] = math.pi / 3
         state[layout.generator_speed] = generator
-        # a filter that has followed for long shows the speed itself
-        if "filtered_generator_speed" in layout.names:
-            state[layout.row("filtered_generator_speed")] = generator
+    for own in layout.first_order:
+        if own.follows:
+            state[layout.row(own.signal.name)] = state[layout.row(own.follows)]
     return state

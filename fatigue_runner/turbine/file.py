@@ -16,7 +16,7 @@ from pydantic import Field, field_validator, model_validator
 
 from fatigue_runner import shipped
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import Section, problem, validated
+from fatigue_runner.inputs.section import Section, known_name, problem, validated
 from fatigue_runner.inputs.source import Source, read_mapping
 from fatigue_runner.turbine import beam
 from fatigue_runner.turbine.tables import INTERPOLATIONS
@@ -260,9 +260,7 @@ class Aerodynamics(Section):
     @field_validator("interpolation")
     @classmethod
     def _known(cls, kind: str) -> str:
-        if kind not in INTERPOLATIONS:
-            raise problem(f"{kind!r} is not known{did_you_mean(kind, INTERPOLATIONS)}")
-        return kind
+        return known_name(kind, INTERPOLATIONS)
 
     @field_validator("stations")
     @classmethod

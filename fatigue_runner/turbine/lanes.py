@@ -52,8 +52,9 @@ def to_groups(columns: Array) -> Array:
     """(k, n) -> (groups, k * LANES); the last group is filled with copies of the last column."""
     k, n = columns.shape
     groups = -(-n // LANES)
-    padded = np.concatenate([columns, np.repeat(columns[:, -1:], groups * LANES - n, axis=1)], axis=1)
-    return np.ascontiguousarray(padded.reshape(k, groups, LANES).transpose(1, 0, 2)).reshape(
+    if groups * LANES > n:
+        columns = np.concatenate([columns, np.repeat(columns[:, -1:], groups * LANES - n, axis=1)], axis=1)
+    return np.ascontiguousarray(columns.reshape(k, groups, LANES).transpose(1, 0, 2)).reshape(
         groups, k * LANES
     )
 

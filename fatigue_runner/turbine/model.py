@@ -30,9 +30,12 @@ from fatigue_runner.turbine.lane_code import LANES
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Model:
-    """name: of the equations; generated: the module with `rhs`, `loads`, `constants`, `TABLES`, ...; layout: its states and signals."""
+    """name: of the equations; generated: the module with `rhs`, `loads`, `constants`, `TABLES`, ...; layout: its states and signals.
+
+    One object for a set of equations: compared by identity, because comparing layouts took longer than evaluating the equations.
+    """
 
     name: str
     generated: ModuleType
@@ -47,6 +50,10 @@ class Model:
         source = Path(str(self.generated.__file__)).read_bytes()
         digest = hashlib.sha256(source + repr(self.layout).encode()).hexdigest()
         return f"{self.name}-{digest[:16]}"
+
+    @cached_property
+    def numba_type(self) -> ModelType:
+        return ModelType(self.key)
 
     @property
     def looks_up_pitch(self) -> bool:
@@ -83,7 +90,7 @@ register_model(ModelType)(models.OpaqueModel)
 
 @typeof_impl.register(Model)
 def _typeof_model(model: Model, _context: Any) -> ModelType:
-    return ModelType(model.key)
+    return model.numba_type
 
 
 def _unbox_model(_type: ModelType, _value: Any, context: Any) -> Any:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.control import baseline
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.layout import HARMONICS, WIND, Channel, Layout
+from fatigue_runner.layout import HARMONICS, Channel, Layout
 from fatigue_runner.rotor import SQUARE, Rotor
 from fatigue_runner.turbine.dynamics import BASELINE_CONTROLLED, UNCONTROLLED, Dynamics
 from fatigue_runner.turbine.file import Control, check_turbine, mapping_source, read_turbine_file
@@ -170,15 +170,13 @@ class Turbine:
         x, size = np.asarray(state, float), self.layout.size
         if x.ndim not in (1, 2) or x.shape[0] != size:
             raise InputError(f"state must have shape ({size},) or ({size}, n), got {x.shape}")
-        columns = x.reshape(size, -1)
-
-        def signals(*values: ArrayLike) -> Array:
-            return np.stack([np.broadcast_to(np.asarray(v, float), columns.shape[1]) for v in values])
-
-        still = [0.0] * (len(self.layout.wind) - len(WIND))
-        p, angle = signals(wind, vertical_shear, horizontal_shear, *still), np.asarray(pitch, float)
+        columns, angle = x.reshape(size, -1), np.asarray(pitch, float)
+        p = np.zeros((len(self.layout.wind), columns.shape[1]))
+        for row, signal in enumerate((wind, vertical_shear, horizontal_shear)):
+            p[row] = signal
         if angle.ndim:
-            return evaluate(self.pitched_kernel_data(), columns, p, signals(angle))[0].reshape(x.shape)
+            u = np.broadcast_to(angle, (1, columns.shape[1]))
+            return evaluate(self.pitched_kernel_data(), columns, p, u)[0].reshape(x.shape)
         return evaluate(self.kernel_data(float(angle)), columns, p)[0].reshape(x.shape)
 
     def loads(

@@ -17,7 +17,7 @@ from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.checks import linear_shear, wind_speed
 from fatigue_runner.wind.mean_shear import NO_TURBINE, checked_order, mean_profile, mean_signals, one_profile
 from fatigue_runner.wind.profiles import Profile
-from fatigue_runner.wind.section import Realisation, Site, WindSection
+from fatigue_runner.wind.section import Harmonics, Realisation, Site, WindSection
 from fatigue_runner.wind.source import WindSource
 
 
@@ -144,7 +144,7 @@ class ConstantSection(WindSection):
     horizontal_shear: Sweep = Field(default=[0.0])
     shear_exponent: float | None = Field(default=None, ge=-1, le=1)
     roughness_length: float | None = Field(default=None, gt=0)
-    harmonics: int | None = Field(default=None, ge=0, le=16)
+    harmonics: Harmonics | None = None
 
     @model_validator(mode="after")
     def _one_vertical_shear(self) -> ConstantSection:

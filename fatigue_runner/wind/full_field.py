@@ -28,7 +28,7 @@ from fatigue_runner.wind.mean_shear import (
     one_profile,
     radial_rule,
 )
-from fatigue_runner.wind.section import Realisation, Site, WindSection
+from fatigue_runner.wind.section import Harmonics, Realisation, Site, WindSection
 from fatigue_runner.wind.source import WindSource
 from fatigue_runner.wind.words import told_strength
 
@@ -233,7 +233,7 @@ class FullFieldSection(WindSection):
     kind = "full-field"
 
     files: Annotated[list[str], BeforeValidator(check_not_empty), BeforeValidator(as_list)]
-    harmonics: int = Field(default=DEFAULT_HARMONICS, ge=0, le=16)
+    harmonics: Harmonics = DEFAULT_HARMONICS
     mean_speed: float | None = Field(default=None, gt=0)
     shear_exponent: float | None = Field(default=None, ge=-1, le=1)
     roughness_length: float | None = Field(default=None, gt=0)

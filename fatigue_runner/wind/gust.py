@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import problem
+from fatigue_runner.inputs.section import known_name
 from fatigue_runner.inputs.sweep import Sweep, as_list, check_not_empty, expand
 from fatigue_runner.naming import joined, speed_id
 from fatigue_runner.rotor import Rotor
@@ -27,7 +27,7 @@ from fatigue_runner.wind.mean_shear import (
     one_profile,
 )
 from fatigue_runner.wind.profiles import PowerLaw, Profile
-from fatigue_runner.wind.section import Realisation, Site, WindSection
+from fatigue_runner.wind.section import Harmonics, Realisation, Site, WindSection
 from fatigue_runner.wind.source import WindSource
 from fatigue_runner.wind.spectrum import TURBULENCE_CLASSES, WIND_CLASSES, wind_class
 
@@ -212,29 +212,22 @@ class GustSection(WindSection):
     begin: float = Field(default=30.0, ge=0)
     shear_exponent: float | None = Field(default=None, ge=-1, le=1)
     roughness_length: float | None = Field(default=None, gt=0)
-    harmonics: int = Field(default=DEFAULT_HARMONICS, ge=0, le=16)
+    harmonics: Harmonics = DEFAULT_HARMONICS
 
     @field_validator("gusts")
     @classmethod
     def _gusts_exist(cls, names: list[str]) -> list[str]:
-        for name in names:
-            if name not in EVENTS:
-                raise problem(f"{name!r} is not known{did_you_mean(name, EVENTS)}")
-        return list(dict.fromkeys(names))
+        return list(dict.fromkeys(known_name(name, EVENTS) for name in names))
 
     @field_validator("turbulence_class")
     @classmethod
     def _class_exists(cls, name: str) -> str:
-        if name not in TURBULENCE_CLASSES:
-            raise problem(f"{name!r} is not known{did_you_mean(name.upper(), TURBULENCE_CLASSES)}")
-        return name
+        return known_name(name, TURBULENCE_CLASSES, name.upper())
 
     @field_validator("wind_class")
     @classmethod
     def _wind_class_exists(cls, name: str) -> str:
-        if name not in WIND_CLASSES:
-            raise problem(f"{name!r} is not known{did_you_mean(name.upper(), WIND_CLASSES)}")
-        return name
+        return known_name(name, WIND_CLASSES, name.upper())
 
     @model_validator(mode="after")
     def _one_profile(self) -> GustSection:

@@ -15,6 +15,7 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.section import problem
 from fatigue_runner.layout import MOST_HARMONICS, WIND
 from fatigue_runner.rotor import Rotor
+from fatigue_runner.wind.azimuth import whole_harmonics
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.profiles import Logarithmic, PowerLaw, Profile, profile_amplitudes, profile_disc_fit
 from fatigue_runner.wind.radial_weight import RadialWeight
@@ -25,13 +26,7 @@ NO_TURBINE = Rotor(63.0, 90.0)
 
 def checked_harmonics(what: str, harmonics: Any) -> int:
     """M; raises InputError for what is no whole number from 0 to the most that a wind has."""
-    whole = isinstance(harmonics, int | np.integer) and not isinstance(harmonics, bool)
-    if not whole or not 0 <= harmonics <= MOST_HARMONICS:
-        raise InputError(
-            f"{what}: harmonics must be a whole number from 0 to {MOST_HARMONICS}, got {harmonics!r}; "
-            f"{DEFAULT_HARMONICS} hold 98 % of every load range, 1 is linear shear only"
-        )
-    return int(harmonics)
+    return whole_harmonics(harmonics, MOST_HARMONICS, f"{what}: ")
 
 
 def mean_profile(what: str, shear_exponent: Any, roughness_length: Any) -> Profile | None:

@@ -19,9 +19,9 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.wind.azimuth import (
     analysis_rows,
     azimuth_grid,
-    checked_harmonics,
     disc_rule,
     radial_shares,
+    whole_harmonics,
 )
 from fatigue_runner.wind.checks import number
 
@@ -111,7 +111,7 @@ def profile_amplitudes(
     c_0 is not 1: a concave profile blows less on average over a circle than at its centre. Raises InputError
     where the rotor reaches into the ground.
     """
-    harmonics = checked_harmonics(harmonics)
+    harmonics = whole_harmonics(harmonics)
     radii, weight = radial_shares(radii, weight, np.max(radii))
     refuse_ground(hub_height, float(radii.max()))
     height = hub_height + np.multiply.outer(radii, np.cos(azimuth_grid()))
@@ -199,7 +199,7 @@ def tower_amplitudes(
     wind at the tower, so with `profile` (None: uniform). The deficit is local: cut off at M harmonics it is
     spread over about 1/M of the turn, with the right energy in each harmonic up to M.
     """
-    harmonics = checked_harmonics(harmonics)
+    harmonics = whole_harmonics(harmonics)
     radii, weight = radial_shares(radii, weight, np.max(radii))
     refuse_ground(hub_height, float(radii.max()))
     psi, r = azimuth_grid(), radii[:, None]

@@ -8,19 +8,23 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+from pydantic import Field
 from pydantic_core import PydanticCustomError
 
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import Section, problem
+from fatigue_runner.inputs.section import Section, known_name, problem
 from fatigue_runner.inputs.source import Place
+from fatigue_runner.layout import MOST_HARMONICS
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.source import WindSource, make_wind
 
 # type -> its section; filled as the modules of this folder are imported
 SECTIONS: dict[str, type[WindSection]] = {}
 DEFAULT = "constant"
+# the key `harmonics` of a section: how many azimuthal ones a wind has
+Harmonics = Annotated[int, Field(ge=0, le=MOST_HARMONICS)]
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,4 @@ def wind_section(value: Any) -> WindSection:
     if isinstance(value, WindSection):
         return value
     kind = value.get("type", DEFAULT) if isinstance(value, dict) else DEFAULT
-    if not isinstance(kind, str) or kind not in SECTIONS:
-        raise problem(f"{kind!r} is not known{did_you_mean(str(kind), SECTIONS)}", key="type")
-    return SECTIONS[kind].model_validate(value)
+    return SECTIONS[known_name(kind, SECTIONS, key="type")].model_validate(value)

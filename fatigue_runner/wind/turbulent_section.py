@@ -7,14 +7,14 @@ from typing import Annotated, Any
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
-from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.inputs.section import problem
+from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.section import known_name, problem
 from fatigue_runner.inputs.sweep import Sweep, expand
 from fatigue_runner.naming import joined, speed_id
 from fatigue_runner.wind import spectrum
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.mean_shear import one_profile
-from fatigue_runner.wind.section import Realisation, Site, WindSection
+from fatigue_runner.wind.section import Harmonics, Realisation, Site, WindSection
 from fatigue_runner.wind.strength import Strength
 
 # keys whose values are names of a table, and how these are spelled there
@@ -61,16 +61,14 @@ class TurbulentSection(WindSection):
     shear_exponent: float | None = Field(default=None, ge=-1, le=1)
     roughness_length: float | None = Field(default=None, gt=0)
     seeds: Annotated[int | list[int], PlainValidator(_seeds)] = 1
-    harmonics: int = Field(default=DEFAULT_HARMONICS, ge=0, le=16)
+    harmonics: Harmonics = DEFAULT_HARMONICS
     spectrum: str = "kaimal"
 
     @field_validator(*TABLES)
     @classmethod
     def _exists(cls, name: str | None, about: ValidationInfo) -> str | None:
         table, spelled = TABLES[str(about.field_name)]
-        if name is not None and name not in table:
-            raise problem(f"{name!r} is not known{did_you_mean(spelled(name), table)}")
-        return name
+        return None if name is None else known_name(name, table, spelled(name))
 
     @model_validator(mode="after")
     def _one_strength(self) -> TurbulentSection:

@@ -25,6 +25,7 @@ SMALL = {
     "name": "small",
     "duration": 8,
     "output_rate": 50,
+    "discard": 1,
     "wind": {"type": "turbulent", "speeds": [7, 9], "intensity": 0.1, "seeds": [9001]},
     "benchmark": {
         "methods": ["heun", "rk4", "etdrk4"],

@@ -68,3 +68,12 @@ def test_what_is_discarded_is_discarded_of_every_series(nrel5mw):
     lengths = {len(kept.time), len(kept.state), len(kept.wind), len(kept.pitch)}
     lengths |= {len(series) for series in (*kept.loads.values(), *kept.control.values())}
     assert lengths == {61} and len(kept.control) == 2
+
+
+@pytest.mark.parametrize("initial", ["paper-spinning", [0.0] * 6 + [1.0, 97.0] + [0.0] * 6 + [1.2, 116.4]])
+def test_a_controller_begins_as_if_a_given_start_had_been_so_for_long(initial):
+    wind = make_plan({**CAMPAIGN, "initial": initial}).resolved.winds[0]
+    assert wind.initial.shape == (18,)
+    assert wind.initial[15] > 0 and wind.initial[16] == wind.initial[15] and wind.initial[17] == 0
+    if not isinstance(initial, str):
+        assert list(wind.initial[:16]) == initial

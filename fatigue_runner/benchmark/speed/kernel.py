@@ -122,16 +122,24 @@ def peak() -> Callable[[], float]:
     return once
 
 
-def _step_work(turbine: Any, method: str, step: float = 0.01, duration: float = 4.0) -> Callable[[], float]:
-    """A whole simulation of 16 turbulent cases logged at 50 Hz: nanoseconds per evaluation and case, everything included."""
+def whole_steps(
+    turbine: Any,
+    method: str,
+    step: float = 0.01,
+    duration: float = 4.0,
+    output_step: float = 0.02,
+    harmonics: int = 1,
+) -> Callable[[], float]:
+    """A whole simulation of 16 turbulent cases with output: nanoseconds per evaluation and case, everything included."""
     from fatigue_runner.integrators import Ensemble, Integrator, simulate
     from fatigue_runner.wind import TurbulentWind
 
     winds = [
-        TurbulentWind(8.0, intensity=0.14, seed=seed, duration=duration, harmonics=1) for seed in range(16)
+        TurbulentWind(8.0, intensity=0.14, seed=seed, duration=duration, harmonics=harmonics)
+        for seed in range(16)
     ]
     initial = np.repeat(turbine.operating_point(8.0)[None], 16, axis=0)
-    ensemble, integrator = Ensemble(turbine, winds, initial, duration, 0.02), Integrator(method, step)
+    ensemble, integrator = Ensemble(turbine, winds, initial, duration, output_step), Integrator(method, step)
 
     def once() -> float:
         block = simulate(ensemble, integrator)
@@ -149,7 +157,7 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     work = {f"packed {n}": _work(packed, turbine, n, LANES) for n in CASES}
     work |= {f"scalar {n}": _work(scalar, turbine, n, 1) for n in CASES}
     work["pitched"] = _work(right_hand_side.varying(), turbine, CASES[-1], LANES, pitched=True)
-    work |= {f"step {name}": _step_work(turbine, name) for name in STEP_METHODS}
+    work |= {f"step {name}": whole_steps(turbine, name) for name in STEP_METHODS}
     work["peak"] = peak()
     with machine.pinned():
         found = machine.interleaved(work, repeats)

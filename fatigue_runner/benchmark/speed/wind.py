@@ -9,13 +9,13 @@ from __future__ import annotations
 import struct
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fatigue_runner.benchmark.speed import machine
+from fatigue_runner.benchmark.speed.kernel import whole_steps
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 SPEEDS, SEEDS, SECONDS = 11, 6, 600.0  # a design load case: 66 series
 HARMONICS = (1, 3, 6)
 POINTS, FIELD_SECONDS, FIELD_STEP, WIDTH = 15, 660.0, 0.05, 145.0
-MEAN, CASES = 8.0, 16  # m/s; cases that are evaluated side by side
+MEAN = 8.0  # m/s
 
 
 def series_of_a_design_load_case(turbine: Turbine, harmonics: int) -> float:
@@ -62,25 +62,6 @@ def field_on_the_rotor(turbine: Turbine, harmonics: int) -> float:
         return time.process_time() - begin
 
 
-def evaluation(turbine: Turbine, harmonics: int, duration: float = 20.0) -> Callable[[], float]:
-    """A piece of work that returns nanoseconds per evaluation and case of whole steps, 16 turbulent cases with output at 10 Hz."""
-    from fatigue_runner.integrators import Ensemble, Integrator, simulate
-    from fatigue_runner.wind import TurbulentWind
-
-    winds = [
-        TurbulentWind(MEAN, intensity=0.14, seed=s, duration=duration, harmonics=harmonics)
-        for s in range(CASES)
-    ]
-    initial = np.repeat(turbine.operating_point(MEAN)[None], CASES, axis=0)
-    ensemble, integrator = Ensemble(turbine, winds, initial, duration, 0.1), Integrator("rk4", 0.01)
-
-    def once() -> float:
-        block = simulate(ensemble, integrator)
-        return sum(t.wall_time for t in block) / sum(t.evaluations for t in block) * 1e9
-
-    return once
-
-
 def measure(repeats: int = 5, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     """All figures of `fatigue-runner benchmark wind` as plain values; s, and ns per evaluation and case."""
     from fatigue_runner.turbine import load_turbine
@@ -93,7 +74,10 @@ def measure(repeats: int = 5, turbine_name: str = "nrel5mw") -> dict[str, Any]:
         )  # libraries are loaded before
         series = {m: series_of_a_design_load_case(turbine, m) for m in HARMONICS}
         field = {m: field_on_the_rotor(turbine, m) for m in HARMONICS}
-        work = {str(m): evaluation(turbine, m) for m in HARMONICS}
+        work = {
+            str(m): whole_steps(turbine, "rk4", duration=20.0, output_step=0.1, harmonics=m)
+            for m in HARMONICS
+        }
         found = machine.interleaved(work, repeats)
     one = found["1"]["median"]
     return {

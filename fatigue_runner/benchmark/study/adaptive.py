@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,8 @@ class Solved:
     evaluations: int
     seconds: float
     states: tuple[Channel, ...]
+    pitch: np.ndarray
+    control: dict[str, np.ndarray] = field(default_factory=dict)
     diverged_at: float | None = None
 
     @property
@@ -61,7 +63,7 @@ def solver(name: str) -> Any:
 
 
 def ranges(cases: Cases, number: int) -> np.ndarray:
-    """(16,) extent of every state in a case."""
+    """(size,) extent of every state in a case."""
     found = simulate(cases.ensemble.part([number]), Integrator("rk4", 0.02))[0]
     return np.ptp(found.state, axis=0)
 
@@ -103,7 +105,10 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
     signals = wind.at(times)
     loads = turbine.loads(states, signals, cases.pitch, wind.channels)
     failed = stepper.t if stepper.status == "failed" else None
-    return Solved(times, states, signals, loads, stepper.nfev, seconds, turbine.layout.states, failed)
+    pitch = np.full(len(times), cases.pitch)
+    return Solved(
+        times, states, signals, loads, stepper.nfev, seconds, turbine.layout.states, pitch, diverged_at=failed
+    )
 
 
 def measure(cases: Cases, reference: Reference, name: str, tolerance: float, count: int) -> Point:

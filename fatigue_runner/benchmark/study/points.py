@@ -74,7 +74,7 @@ def point_of(integrator: Integrator, cases: Cases, block: Sequence[Any]) -> Poin
 
 @dataclass
 class Sample:
-    """What is kept of a reference trajectory; time (n,) [s], state (n, 16)."""
+    """What is kept of a reference trajectory; time (n,) [s], state (n, size)."""
 
     time: np.ndarray
     state: np.ndarray

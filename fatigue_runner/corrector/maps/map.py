@@ -122,6 +122,12 @@ class Map(ABC):
         """What it sees, in words."""
         return self.kind
 
+    def _sees_more(self, factors: Sequence[str]) -> str:
+        """The same for a map that multiplies what it sees with `factors` and looks back."""
+        by = f" x (1, {', '.join(factors)})" if factors else ""
+        looks = f", looks back {self.history} step(s)" if self.history else ""
+        return self.kind + by + looks
+
 
 def map_class(kind: str) -> type[Map]:
     """The class of this kind. Raises CorrectorError with the nearest known one."""

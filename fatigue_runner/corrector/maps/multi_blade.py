@@ -110,9 +110,7 @@ class MultiBladeMap(Map):
 
     @property
     def sees(self) -> str:
-        by = f" x (1, {', '.join(self.factors)})" if self.factors else ""
-        looks = f", looks back {self.history} step(s)" if self.history else ""
-        return self.kind + by + looks
+        return self._sees_more(self.factors)
 
 
 def past_of(method: Any, history: int) -> int:

@@ -107,6 +107,4 @@ class StageMap(Map):
 
     @property
     def sees(self) -> str:
-        by = f" x (1, {', '.join(self.factors)})" if self.factors else ""
-        looks = f", looks back {self.history} step(s)" if self.history else ""
-        return self.kind + by + looks
+        return self._sees_more(self.factors)

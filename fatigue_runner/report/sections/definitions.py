@@ -38,7 +38,7 @@ def build(run: Run) -> Section:
         (
             "NRMSE",
             "Root mean square of (state − reference) over the output samples, over the range (max − min) of "
-            "the reference state; the headline is the worst of the 16 states.",
+            "the reference state; the headline is the worst of all states.",
         ),
         (
             "Cost",

@@ -22,9 +22,9 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.wind.azimuth import (
     analysis_rows,
     azimuth_grid,
-    checked_harmonics,
     disc_rule,
     radial_shares,
+    whole_harmonics,
 )
 from fatigue_runner.wind.checks import number
 from fatigue_runner.wind.fields.field import WindField
@@ -102,7 +102,7 @@ def harmonics_of(
     (OpenFAST's ShftTilt, negative for an upwind rotor: the top is farther downwind). Raises InputError for a
     grid that does not cover the rotor or belongs to another hub, and for weights and M out of bounds.
     """
-    harmonics = checked_harmonics(harmonics)
+    harmonics = whole_harmonics(harmonics)
     radii, weight = radial_shares(radii, weight, rotor_radius)
     wind_field.refuse_rotor(hub_height, rotor_radius)
     lead = np.tan(tilt) * (wind_field.z - hub_height) / wind_field.mean_speed / wind_field.time_step

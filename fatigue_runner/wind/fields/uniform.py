@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.wind.azimuth import checked_harmonics, radial_shares
+from fatigue_runner.wind.azimuth import radial_shares, whole_harmonics
 from fatigue_runner.wind.checks import decimal, number
 from fatigue_runner.wind.fields.files import read_text
 from fatigue_runner.wind.fields.projection import FieldHarmonics
@@ -174,7 +174,7 @@ def harmonics_of_uniform(
     radii, weight (k,) as in `radial_shares`; sampled every `time_step` [s] (None: the file's own). Corners between
     the file's lines lie on samples where the step divides its times.
     """
-    harmonics = checked_harmonics(harmonics)
+    harmonics = whole_harmonics(harmonics)
     radii, weight = radial_shares(radii, weight, rotor_radius)
     refuse_ground(hub_height, rotor_radius)
     step = time_step or wind.time_step
