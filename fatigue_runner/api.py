@@ -12,6 +12,7 @@ from fatigue_runner.fatigue import damage_equivalent_load, rainflow
 from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
 from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
 from fatigue_runner.turbine import load_turbine
+from fatigue_runner.values import unmasked
 from fatigue_runner.wind import (
     ConstantWind,
     FullFieldWind,
@@ -104,7 +105,7 @@ def _state(turbine: Any, initial: Any, wind: WindSource, pitch: float) -> np.nda
         if initial not in INITIAL_STATES:
             raise InputError(f"unknown initial state {initial!r}{did_you_mean(initial, INITIAL_STATES)}")
         return initial_state(turbine, initial, wind, pitch)
-    state, size = np.asarray(initial, dtype=np.float64), turbine.layout.size
+    state, size = np.asarray(unmasked("initial", initial), dtype=np.float64), turbine.layout.size
     if state.shape != (size,) or not np.isfinite(state).all():
         raise InputError(f"initial must be a state of {size} finite numbers, got shape {state.shape}")
     return state

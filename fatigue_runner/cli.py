@@ -6,6 +6,7 @@ Exit codes: 0 all done; 1 some cases failed or diverged; 2 the input was wrong; 
 from __future__ import annotations
 
 import sys
+import warnings
 from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning
 from fatigue_runner.terminal import console
 
 if TYPE_CHECKING:
@@ -174,10 +175,22 @@ def _print_outcome(results: Results, console: Console) -> None:
         console.print(f"report: {escape(str(results.out / 'report.html'))}", soft_wrap=True)
 
 
+def _say_warnings_plainly() -> None:
+    """A warning of this program is a sentence for its user, without the line of code that gave it."""
+    usual = warnings.formatwarning
+
+    def plain(message: Any, category: type[Warning], *place: Any) -> str:
+        own = issubclass(category, FatigueRunnerWarning)
+        return f"warning: {message}\n" if own else usual(message, category, *place)
+
+    warnings.formatwarning = plain  # type: ignore[assignment]
+
+
 def main() -> None:
     """Entry point: runs the command and turns errors into one sentence and an exit code."""
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) != len(sys.argv) - 1
+    _say_warnings_plainly()
     try:
         app(args=arguments, prog_name="fatigue-runner")
     except BrokenPipeError:  # `| head` closed the pipe

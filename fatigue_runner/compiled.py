@@ -1,13 +1,18 @@
 """numba with a cache that is keyed by the sources of all compiled functions.
 
 numba's own cache looks at the file of a function only: it would go on running a stepping loop with an old kernel inlined after
-the kernel has changed. Here every change of any file that compiles something gets a cache folder of its own.
+the kernel has changed, or with a constant that another module no longer has. Here every change of a file that compiles something, or
+that such a file imports, gets a cache folder of its own. Where that folder cannot be written, nothing is cached: numba would else write
+beside the sources, keyed by one file alone.
 """
 
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
 import os
+import re
+import tempfile
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -17,6 +22,8 @@ from typing import Any
 import numba
 from numba.core import config as numba_config
 from numba.core.caching import IndexDataCacheFile
+
+from fatigue_runner.errors import FatigueRunnerWarning
 
 # `nnan` lets LLVM assume that there is no NaN: no divergence check may stand in a function compiled with it.
 # Without `reassoc`: with it LLVM sorts sums anew each time that it optimises a function, so that a kernel gives other bits when
@@ -34,22 +41,57 @@ INLINE: dict[str, Any] = {**LEAN, "forceinline": True}
 config: Any = numba_config  # its attributes are set at import, which no type checker sees
 
 _KEPT = 8  # cache folders of earlier versions that stay
+_IMPORT = re.compile(
+    rb"^(?:from (fatigue_runner[\w.]*) import (\([^)]*\)|[^\n(]*)|import (fatigue_runner[\w.]*))", re.M
+)
 
 
 @cache
 def cache_folder() -> Path:
     """The folder of compiled kernels: under NUMBA_CACHE_DIR where that is set, else the user's cache folder."""
     digest = hashlib.sha256(numba.__version__.encode())
-    package = Path(__file__).parent
-    for path in sorted(package.rglob("*.py")):
-        source = path.read_bytes()
-        if b"fatigue_runner.compiled" in source:
-            digest.update(source)
+    for path in compiled_sources(Path(__file__).parent):
+        digest.update(path.read_bytes())
     base = config.CACHE_DIR or os.path.join(
         os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "fatigue-runner"
     )
     _prune(Path(base))
     return Path(base) / f"kernels-{digest.hexdigest()[:16]}"
+
+
+def compiled_sources(package: Path) -> list[Path]:
+    """The files of a package's folder that compile something, and all that they import from it: numba freezes the constants that a
+    function uses, wherever they stand."""
+    modules = {
+        ".".join((package.name, *path.relative_to(package).with_suffix("").parts)).removesuffix(
+            ".__init__"
+        ): path
+        for path in package.rglob("*.py")
+    }
+    texts = {name: path.read_bytes() for name, path in modules.items()}
+    left = [name for name, text in texts.items() if b"fatigue_runner.compiled" in text]
+    found: set[str] = set()
+    while left:
+        name = left.pop()
+        if name in found or name not in texts:
+            continue
+        found.add(name)
+        for module, names, plain in _IMPORT.findall(texts[name]):
+            above = (module or plain).decode()
+            inner = {f"{above}.{word}" for word in re.findall(r"\w+", names.decode())} & texts.keys()
+            left += inner or {above} - {package.name}  # the package itself only hands names on
+    return sorted(modules[name] for name in found)
+
+
+@cache
+def _writable() -> bool:
+    """Whether kernels can be kept in the cache's folder."""
+    try:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=cache_folder()).close()
+    except OSError:
+        return False
+    return True
 
 
 def _prune(base: Path) -> None:
@@ -75,6 +117,13 @@ class _Index(IndexDataCacheFile):
         except (ImportError, AttributeError):
             return {}
 
+    def save(self, key: Any, data: Any) -> None:
+        keep: Any = super().save
+        try:
+            keep(key, data)
+        except OSError:  # the disk is full: the kernel runs all the same
+            _warn_once()
+
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """`numba.njit(cache=True, **options)` with the keyed cache; without a writable one it warns and compiles every time.
@@ -85,27 +134,40 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     options = {"fastmath": False, **options}
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        before = config.CACHE_DIR
-        config.CACHE_DIR = str(cache_folder())
-        try:
-            made: Any = numba.njit(cache=True, **options)(function)
-            index = getattr(getattr(made, "_cache", None), "_cache_file", None)
-            if index is not None:  # numba may be told not to compile at all
-                index.__class__ = _Index
-            return made
-        except (RuntimeError, OSError):
+        made = _cached(function, options) if _writable() else None
+        if made is None:
             _warn_once()
             return numba.njit(**options)(function)
-        finally:
-            config.CACHE_DIR = before
+        return made
 
     return decorate
 
 
+def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Callable[..., Any] | None:
+    """The function with the keyed cache; None where numba would put its kernels elsewhere."""
+    before = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_folder())
+    try:
+        made: Any = numba.njit(cache=True, **options)(function)
+    except (RuntimeError, OSError):  # numba found no place at all
+        return None
+    finally:
+        config.CACHE_DIR = before
+    index = getattr(getattr(made, "_cache", None), "_cache_file", None)
+    if index is not None:  # numba may be told not to compile at all
+        if not Path(made._cache.cache_path).is_relative_to(cache_folder()):
+            return None
+        index.__class__ = _Index
+    return made
+
+
 @cache
 def _warn_once() -> None:
+    if multiprocessing.parent_process() is not None:
+        return  # a worker: the run's own process has said it
     warnings.warn(
         f"the kernel cache {cache_folder()} cannot be written: kernels are compiled anew in every process (seconds); "
         "set NUMBA_CACHE_DIR to a writable folder",
-        stacklevel=3,
+        FatigueRunnerWarning,
+        stacklevel=4,
     )

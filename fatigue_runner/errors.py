@@ -18,6 +18,10 @@ class InputError(FatigueRunnerError):
     exit_code = 2
 
 
+class FatigueRunnerWarning(UserWarning):
+    """What a user should know of a figure or a run that goes on all the same."""
+
+
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """`; did you mean 'x'?` for the nearest known word, else the list of what is known."""
     known = list(known)

@@ -24,6 +24,8 @@ FLOOR = {
     "trajectory",
     "compiled",
     "terminal",
+    "values",
+    "encoded",
     "shipped",
     "rotor",
     "_version",

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
+import pytest
+from numba.core.caching import IndexDataCacheFile
 
-from fatigue_runner.compiled import FAST, cache_folder, njit
+from fatigue_runner import compiled
+from fatigue_runner.compiled import FAST, cache_folder, compiled_sources, njit
+from fatigue_runner.errors import FatigueRunnerWarning
 
 
 def test_a_nan_check_called_from_a_fast_loop_is_kept(tmp_path, monkeypatch):
@@ -33,29 +39,77 @@ def test_the_cache_folder_is_named_by_the_sources_of_compiled_functions(tmp_path
     assert other.stdout.strip() == cache_folder().name
 
 
-def test_an_unwritable_cache_folder_only_costs_a_warning(tmp_path):
+def test_the_cache_follows_what_compiled_functions_import():
+    """numba freezes the constants that a function uses: one of `layout` must not outlive a change of that file."""
+    package = Path(compiled.__file__).parent
+    names = {path.relative_to(package).as_posix() for path in compiled_sources(package)}
+    assert {"turbine/generated/kernel.py", "integrators/stepping.py", "fatigue/kernel.py"} <= names
+    assert {"layout.py", "integrators/multi_blade.py", "control/baseline.py"} <= names
+    assert not names & {
+        "cli.py",
+        "report/page.py",
+        "campaign/run.py",
+    }  # an edit there costs no minute of compiling
+
+
+def test_an_import_of_a_compiled_file_is_found_through_others(tmp_path):
+    package = tmp_path / "fatigue_runner"
+    (package / "room").mkdir(parents=True)
+    (package / "loop.py").write_text(
+        "from fatigue_runner.compiled import njit\nfrom fatigue_runner.room import (\n    one,\n)\n"
+    )
+    (package / "room" / "one.py").write_text("from fatigue_runner.widths import WIDTH\n")
+    (package / "widths.py").write_text("WIDTH = 3\n")
+    (package / "unused.py").write_text("from fatigue_runner.loop import step\n")
+    assert [path.name for path in compiled_sources(package)] == ["loop.py", "one.py", "widths.py"]
+
+
+# where the folder of kernels cannot be: below a file by its own variable, and a home that leads nowhere
+UNWRITABLE = {"variable": {"NUMBA_CACHE_DIR": "{file}"}, "home": {"HOME": "{file}/home"}}
+
+
+@pytest.mark.parametrize("environment", UNWRITABLE.values(), ids=UNWRITABLE)
+def test_an_unwritable_cache_folder_costs_a_warning_and_leaves_no_kernel_anywhere(tmp_path, environment):
+    """numba alone would write into `__pycache__` beside the source, and run what it finds there after the equations have changed."""
     blocked = tmp_path / "file"
     blocked.write_text("a file where the cache folder should be")
-    code = (
-        "import warnings\n"
-        "with warnings.catch_warnings(record=True) as seen:\n"
-        "    warnings.simplefilter('always')\n"
-        "    from fatigue_runner.compiled import njit\n"
-        "    double = njit()(lambda x: 2 * x)\n"
-        "    assert double(2) == 4\n"
-        "assert any('cannot be written' in str(w.message) for w in seen), seen\n"
+    (tmp_path / "own.py").write_text(
+        "from fatigue_runner.compiled import njit\n"
+        "@njit()\n"
+        "def double(x):\n"
+        "    return 2 * x\n"
+        "assert double(2) == 4\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, "-c", "import own"],
         capture_output=True,
         text=True,
         env={
-            "NUMBA_CACHE_DIR": str(blocked),
             "PATH": "/usr/bin:/bin",
-            "PYTHONPATH": ":".join(p for p in sys.path if p),
+            "PYTHONPATH": ":".join([str(tmp_path), *filter(None, sys.path)]),
+            **{name: value.format(file=blocked) for name, value in environment.items()},
         },
     )
     assert done.returncode == 0, done.stderr
+    assert "cannot be written" in done.stderr and "NUMBA_CACHE_DIR" in done.stderr
+    assert not [*tmp_path.rglob("*.nbi"), *tmp_path.rglob("*.nbc")]
+
+
+def test_a_full_disk_does_not_end_a_kernel(tmp_path, monkeypatch):
+    """What numba cannot keep is compiled again next time."""
+
+    def full(*args):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(IndexDataCacheFile, "save", full)
+    compiled._warn_once.cache_clear()
+
+    @njit()
+    def triple(x):
+        return 3 * x
+
+    with pytest.warns(FatigueRunnerWarning, match="kernel cache"):
+        assert triple(2) == 6
 
 
 def test_a_cache_that_names_a_module_which_is_gone_is_made_anew(tmp_path):

@@ -63,8 +63,19 @@ def _refuse_same_names(cases: Iterable[Case]) -> None:
     seen: dict[str, Case] = {}
     for case in cases:
         if case.id in seen:
-            raise InputError(f"two cases would have the same name {case.id!r}; rename one of the wind files")
+            raise InputError(
+                f"two cases would have the same name {case.id!r}; {_way_out(seen[case.id], case)}"
+            )
         seen[case.id] = case
+
+
+def _way_out(one: Case, other: Case) -> str:
+    if one.integration != other.integration:
+        a, b = one.integration, other.integration
+        return f"their steps {a.step!r} and {b.step!r} s differ too little, or their correctors are called alike; remove one"
+    if one.wind.file is not None:
+        return "rename one of the wind files"
+    return "their winds differ in digits that no name shows; remove one"
 
 
 def blocks(items: Sequence[Any], keys: Sequence[Any], size: int, workers: int) -> list[list[Any]]:

@@ -19,7 +19,7 @@ wind.type       `constant` (default), `turbulent`, `file`, ...; the other keys o
 integrators     list of {method, step}: `step` [s] is a sweep, and every method meets every wind; with `corrector`, a name of
                 `fatigue-runner correctors list` or a file's path, its local error is corrected; `mode`: `hybrid` (default),
                 which guards the corrector, or `enhanced`
-reference       {method, step}: what the integrators are measured against (default rk7 at 0.001 s); or null
+reference       {method, step}: what the integrators are measured against (default rk7 at 0.001 s); or none
 
 fatigue.channels          load channels that are counted (default: blade 1 root and tower base, two each)
 fatigue.wohler_exponents  default [3, 4, 5, 10, 12]
@@ -92,6 +92,11 @@ def _positive_steps(pieces: list[Piece]) -> list[Piece]:
     return pieces
 
 
+def _none_in_words(value: Any) -> Any:
+    """`none` is what a person writes for YAML's `null`."""
+    return None if isinstance(value, str) and value.strip().lower() == "none" else value
+
+
 class IntegratorSection(Section):
     """One method and the steps [s] it runs at; `steps` may be written for `step`."""
 
@@ -99,7 +104,7 @@ class IntegratorSection(Section):
 
     method: str
     step: Annotated[Sweep, AfterValidator(_positive_steps)]
-    corrector: str | None = None
+    corrector: Annotated[str | None, BeforeValidator(_none_in_words)] = None
     mode: Literal["hybrid", "enhanced"] = "hybrid"
 
     @model_validator(mode="after")
@@ -135,6 +140,18 @@ class Fatigue(Section):
             if name not in LOAD_NAMES:
                 raise problem(f"{name!r} is no load channel{did_you_mean(name, LOAD_NAMES)}")
         return list(dict.fromkeys(channels))
+
+    @field_validator("wohler_exponents")
+    @classmethod
+    def _exponents_differ(cls, exponents: list[float]) -> list[float]:
+        named: dict[str, float] = {}
+        for m in dict.fromkeys(exponents):
+            first = named.setdefault(f"{m:g}", m)
+            if first != m:
+                raise problem(
+                    f"{first!r} and {m!r} would have one column, m{m:g}, in the table; keep one of the two"
+                )
+        return list(named.values())
 
 
 Topic = Literal["state", "loads", "status", "wind"]
@@ -207,7 +224,7 @@ class Campaign(Section):
     workers: int = Field(default=2, ge=1, le=1024)
     wind: Annotated[SerializeAsAny[WindSection], PlainValidator(wind_section)]
     integrators: Annotated[list[IntegratorSection], BeforeValidator(check_not_empty)]
-    reference: Reference | None = Reference()
+    reference: Annotated[Reference | None, BeforeValidator(_none_in_words)] = Reference()
     fatigue: Fatigue = Fatigue()
     log: Log = Log()
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.values import unmasked
 
 
 class FatigueInputError(InputError, ValueError):
@@ -15,7 +16,7 @@ class FatigueInputError(InputError, ValueError):
 
 def finite_series(series: Any) -> np.ndarray:
     """`series` as contiguous float64 (n,); refused when not one-dimensional or not finite."""
-    values = np.ascontiguousarray(series, dtype=np.float64)
+    values = np.ascontiguousarray(unmasked("the load series", series, FatigueInputError), dtype=np.float64)
     if values.ndim != 1:
         raise FatigueInputError(
             f"a load series has one dimension, got shape {values.shape}; count one channel at a time"
@@ -37,7 +38,7 @@ def first_not_finite(values: np.ndarray) -> int | None:
 
 def non_negative(name: str, values: Any) -> np.ndarray:
     """`values` as float64; refused when any is negative, NaN or infinite."""
-    array = np.asarray(values, dtype=np.float64)
+    array = np.asarray(unmasked(name, values, FatigueInputError), dtype=np.float64)
     bad = ~(np.isfinite(array) & (array >= 0.0))
     if bad.any():
         index = int(np.argmax(bad.ravel()))

@@ -17,6 +17,7 @@ from fatigue_runner.fatigue.checks import (
 )
 from fatigue_runner.fatigue.rainflow import rainflow
 from fatigue_runner.fatigue.sn_curves import SNCurve, sn_curve
+from fatigue_runner.values import unmasked
 
 # A channel whose values agree to this fraction of their magnitude is constant: the rest is rounding.
 CONSTANT_TO = 1e-10
@@ -73,7 +74,8 @@ def goodman(ranges: Any, means: Any, ultimate: float, fixed_mean: float = 0.0) -
     Source: Goodman (1899); with a fixed mean as in MLife's theory manual (NREL, 2012).
     """
     strength = positive("the ultimate strength", ultimate)
-    s, mean = non_negative("load ranges", ranges), np.asarray(means, dtype=np.float64)
+    s = non_negative("load ranges", ranges)
+    mean = np.asarray(unmasked("the means", means, FatigueInputError), dtype=np.float64)
     if not (mean < strength).all() or not fixed_mean < strength:
         raise FatigueInputError(
             f"a mean of {np.max(mean, initial=fixed_mean):g} reaches the ultimate strength {strength:g}: "
@@ -135,7 +137,7 @@ def channel_fatigue(
     exponents or duration only.
     """
     n_eq = short_term_cycles(duration)
-    values = np.ascontiguousarray(series, dtype=np.float64)
+    values = np.ascontiguousarray(np.ma.filled(np.ma.asarray(series, dtype=np.float64), np.nan))
     condition = channel_condition(values)
     if condition is not None:
         return ChannelFatigue(condition)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from typing import Any, ClassVar, TypeVar
 
@@ -95,6 +96,7 @@ def input_error(error: ValidationError, source: Source) -> InputError:
         if context.get("key") is not None:
             path = (*path, context["key"])
         sentence = _sentence(item, path, source)
+        sentence += _decimal_point(item.get("input"))
         found.setdefault(f"{source.where(path)}: {sentence}", source.line(path) or 0)
     return InputError("\n".join(sorted(found, key=lambda text: found[text])))
 
@@ -114,6 +116,14 @@ def _sentence(item: Any, path: tuple[Any, ...], source: Source) -> str:
     words = _WORDS.get(item["type"])
     what = words.format(**context) if words else item["msg"][:1].lower() + item["msg"][1:]
     return f"{name} {what}; got {item['input']!r:.60}"
+
+
+def _decimal_point(value: Any) -> str:
+    """The way out for a number that is text because of its comma."""
+    if not isinstance(value, str) or not re.fullmatch(r"[-+]?[\d.]*,\d+([eE][-+]?\d+)?", value.strip()):
+        return ""
+    whole, _, part = value.strip().rpartition(",")
+    return f"; write it with a decimal point: {whole.replace('.', '')}.{part}"
 
 
 def key_name(path: tuple[Any, ...], source: Source) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fatigue_runner.encoded import decoded
 from fatigue_runner.errors import InputError
 
 # Aliases (`&a`, `*a`) can nest into each other and grow without bound from a few bytes of text.
@@ -42,6 +44,7 @@ class Source:
     ) -> None:
         self.name, self.what = name, what
         self.text = text
+        self._text_lines = text.split("\n")
         self.folder = folder or Path.cwd()
         self._lines: dict[tuple[str | int, ...], int] = {(): 1}
         self._names: dict[tuple[str | int, ...], str] = {}  # of places in another file, see `over`
@@ -125,7 +128,27 @@ class Source:
         positions = getattr(getattr(node, "lc", None), "data", None) or {}
         if key in positions:
             self._lines[(*path, name)] = positions[key][0] + 1
+            self._refuse_look_alike(key, value, positions[key], (*path, name))
         return self._plain(value, (*path, name))
+
+    def _refuse_look_alike(
+        self, key: Any, value: Any, at: Sequence[int], path: tuple[str | int, ...]
+    ) -> None:
+        """Raises InputError for what YAML reads otherwise than it was meant: `1_0.3` as 10.3, and in braces `{step: 0,02}` as a
+        step of 0 and a key 02. at: line and column of the key and of the value."""
+        lines = self._text_lines
+        line, column = at[-2], at[-1]
+        found = re.match(r"[-+.\w]+", lines[line][column:]) if line < len(lines) else None
+        if found and "_" in found[0] and isinstance(value, int | float) and not isinstance(value, bool):
+            raise InputError(f"{self.where(path)}: {found[0]} is no number here; write it without `_`")
+        before = lines[at[0]][: at[1]] if at[0] < len(lines) else ""
+        comma = re.search(r"([-+]?\d+),$", before)
+        if value is None and comma and isinstance(key, int | float):
+            digits = re.match(r"\w*", lines[at[0]][at[1] :])
+            meant = f"{comma[1]},{digits[0] if digits else ''}"
+            raise InputError(
+                f"{self.where(path)}: {meant} is two entries to YAML; write the number with a decimal point, {meant.replace(',', '.')}"
+            )
 
 
 def _laid(over: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, Any]:
@@ -143,14 +166,14 @@ def read_mapping(path: Path, what: str, keys: str) -> Source:
     not YAML, with its line.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        data = path.read_bytes()
     except FileNotFoundError:
         raise InputError(f"{path}: no such file{_nearby(path)}") from None
     except IsADirectoryError:
         raise InputError(f"{path} is a folder; give the {what}'s YAML file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as text: {error}") from None
-    return parse_mapping(text, path, what, keys)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    return parse_mapping(decoded(data, path, f"a {what} in YAML"), path, what, keys)
 
 
 def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
@@ -159,7 +182,7 @@ def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     try:
-        data = YAML(typ="rt").load(text)
+        data = YAML(typ="rt").load(_with_spaces(text, path))
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"{path}:{mark.line + 1}" if mark else str(path)
@@ -173,6 +196,23 @@ def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
     return Source(str(path), data, text, path.resolve().parent, what)
 
 
+def _with_spaces(text: str, path: Path) -> str:
+    """The text with a space for every tab that stands behind something: YAML takes it for one (1.2.2, 6.6), the parser does not.
+
+    Raises InputError for a line that is indented with a tab, which YAML does not allow.
+    """
+    if "\t" not in text:
+        return text
+    lines = text.split("\n")
+    for number, line in enumerate(lines, start=1):
+        indent = line[: len(line) - len(line.lstrip())]
+        if "\t" in indent and line.strip() and not line.lstrip().startswith("#"):
+            raise InputError(
+                f"{path}:{number}: the line is indented with a tab; YAML takes spaces only, so use these"
+            )
+    return "\n".join(line.replace("\t", " ") for line in lines)
+
+
 def _yaml_problem(error: Any) -> str:
     """One sentence for a YAML error."""
     from ruamel.yaml.constructor import DuplicateKeyError
@@ -180,6 +220,8 @@ def _yaml_problem(error: Any) -> str:
     problem = str(error.problem or error.context or "not valid YAML").strip()
     if isinstance(error, DuplicateKeyError):
         key = problem.split('"')[1] if '"' in problem else "?"
+        if key.isdigit():  # {start: 3,5, stop: 4,5}: twice a key 5
+            return f"key {key!r} is given twice in one section; write numbers with a decimal point, not with a comma"
         return f"key {key!r} is given twice in one section; keep one of the two"
     return f"not valid YAML: {problem}"
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.values import unmasked
 from fatigue_runner.wind.cells import cell_count, evaluate, minimum
 
 Array = NDArray[np.float64]
@@ -26,7 +27,10 @@ class PitchSeries:
     angle: ArrayLike
 
     def __post_init__(self) -> None:
-        time, angle = (np.asarray(values, float).copy() for values in (self.time, self.angle))
+        time, angle = (
+            np.asarray(unmasked(f"pitch series: {name}", getattr(self, name)), float).copy()
+            for name in ("time", "angle")
+        )
         if time.ndim != 1 or time.shape != angle.shape or len(time) < 2:
             raise InputError(
                 f"pitch series: give at least two times and one angle for each, got {time.size} and {angle.size}"

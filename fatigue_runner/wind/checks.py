@@ -10,6 +10,7 @@ import numpy as np
 
 from fatigue_runner.channels import WIND_NAMES
 from fatigue_runner.errors import InputError
+from fatigue_runner.values import unmasked
 from fatigue_runner.wind.cells import minimum
 
 
@@ -36,14 +37,6 @@ def number(
     raise InputError(f"{what} must be {wanted}, got {value!r}{f'; {hint}' if hint else ''}")
 
 
-def decimal(text: str) -> float | None:
-    """The number that a text of a file is, NaN and infinities too; None for anything else: `1_0.3` is a damaged number, not 10.3."""
-    try:
-        return None if "_" in text else float(text)
-    except ValueError:
-        return None
-
-
 def wind_speed(what: str, value: Any) -> float:
     """A wind speed [m/s] that the aerodynamics can take: finite and positive."""
     return number(what, value, above=0.0, unit=" m/s", hint="the aerodynamics need wind from the front")
@@ -63,7 +56,7 @@ def signal_table(what: str, values: Any) -> np.ndarray:
     """
     columns = ", ".join(WIND_NAMES)
     try:
-        table = np.array(values, float)
+        table = np.array(unmasked(f"{what}: values", values), float)
     except (TypeError, ValueError):
         raise InputError(f"{what}: values must be numbers, one row per sample with {columns}") from None
     if table.ndim == 1:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,57 +14,67 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from fatigue_runner.channels import WIND_NAMES
+from fatigue_runner.encoded import decoded
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.source import Place
 from fatigue_runner.inputs.sweep import as_list, check_not_empty
 from fatigue_runner.naming import file_id
-from fatigue_runner.wind.checks import decimal
+from fatigue_runner.values import decimal
+from fatigue_runner.wind.fields.files import read_bytes
 from fatigue_runner.wind.fields.formats import SUFFIXES
 from fatigue_runner.wind.section import Realisation, Site, WindSection
 from fatigue_runner.wind.series import SeriesWind
 from fatigue_runner.wind.source import SOURCES
 
 COLUMNS = ("time", *WIND_NAMES)
+NEEDED = ("time", "wind_speed")
 SEPARATORS = {";": "semicolons", "\t": "tabs"}
-COARSEST = 0.05  # rounding of times over their step beyond which any series could be uniform
+COARSEST = 0.2  # rounding of times over their step beyond which a series with a gap could be uniform
 AS_FIELD = "give it as `type: full-field`"
 
 
 def read_wind_file(path: str | Path) -> SeriesWind:
     """Cubic series through the samples of a csv file: time [s], wind_speed [m/s] and the two shears [-].
 
-    The header names the columns, in any order: `time,wind_speed,vertical_shear,horizontal_shear`. Times start
-    at 0 and rise by a constant step. Raises InputError with file and line for anything else.
+    The header names the columns, in any order: `time,wind_speed,vertical_shear,horizontal_shear`; a shear without a column is 0. Times
+    start at 0 and rise by a constant step. Raises InputError with file and line for anything else.
     """
     path = Path(path)
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:  # spreadsheets write a byte-order mark
-            reader = csv.reader(file)
-            rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such wind file; check the path") from None
-    except UnicodeDecodeError:
-        raise InputError(
-            f"{path}: this is binary or no UTF-8, but a csv file is text; if it is a wind field (.bts, .wnd, .hh, a Mann box), {AS_FIELD}"
-        ) from None
-    except (OSError, csv.Error) as error:
-        raise InputError(f"{path}: cannot be read as a csv file in UTF-8 ({error})") from None
+        reader = csv.reader(io.StringIO(_text(path), newline=""))
+        rows = [(reader.line_num, row) for row in reader if any(map(str.strip, row))]
+    except csv.Error as error:
+        raise InputError(f"{path}: cannot be read as a csv file ({error})") from None
     if not rows:
         raise InputError(f"{path}:1: the file is empty; its first line must be {','.join(COLUMNS)}")
     order = _header(path, *rows[0])
-    samples = np.array([_sample(path, line, row, order) for line, row in rows[1:]])
+    width = len(rows[0][1])
+    samples = np.array([_sample(path, line, row, order, width) for line, row in rows[1:]])
     if len(samples) < 2:
         raise InputError(f"{path}: {len(samples)} samples after the header; a series needs at least two")
-    digits = max(_decimals(row[order[0]]) for _, row in rows[1:])
-    time_step = _time_step(path, [line for line, _ in rows[1:]], samples[:, 0], 0.5 * 10.0**-digits)
+    time_step = _time_step(
+        path, [line for line, _ in rows[1:]], samples[:, 0], _rounding(rows[1:], order["time"])
+    )
     try:
         return SeriesWind(time_step, samples[:, 1:], origin=path.stem)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _header(path: Path, line: int, row: list[str]) -> list[int]:
-    """Where each of COLUMNS stands in a row."""
+def _text(path: Path) -> str:
+    data = read_bytes(path)
+    try:
+        return decoded(data, path, "a csv file")
+    except InputError as error:
+        if b"\0" not in data[:4096]:
+            raise
+        raise InputError(
+            f"{path}: this is binary, but a csv file is text; if it is a wind field (.bts, .wnd, .hh, a Mann box), {AS_FIELD}"
+        ) from error
+
+
+def _header(path: Path, line: int, row: list[str]) -> dict[str, int]:
+    """Where each of COLUMNS that is there stands in a row."""
     names = [field.strip() for field in row]
     for sign, word in SEPARATORS.items():
         if len(names) == 1 and sign in names[0]:
@@ -78,25 +89,28 @@ def _header(path: Path, line: int, row: list[str]) -> list[int]:
             )
         if names.count(name) > 1:
             raise InputError(f"{path}:{line}: column {name!r} appears twice; keep one")
-    missing = [name for name in COLUMNS if name not in names]
+    missing = [name for name in NEEDED if name not in names]
     if missing:
         raise InputError(
-            f"{path}:{line}: column {missing[0]!r} is missing; the header must be {','.join(COLUMNS)}"
+            f"{path}:{line}: column {missing[0]!r} is missing; the header must be {','.join(COLUMNS)}, of which the shears may be left out"
         )
-    return [names.index(name) for name in COLUMNS]
+    return {name: names.index(name) for name in COLUMNS if name in names}
 
 
-def _sample(path: Path, line: int, row: list[str], order: list[int]) -> list[float]:
-    """The numbers of one row in the order of COLUMNS."""
-    if len(row) != len(COLUMNS):
+def _sample(path: Path, line: int, row: list[str], order: dict[str, int], width: int) -> list[float]:
+    """The numbers of one row in the order of COLUMNS, 0 for a shear without a column."""
+    if len(row) != width:
+        comma = "; write numbers with a decimal point" if len(row) > width else ""
         raise InputError(
-            f"{path}:{line}: {len(row)} fields, the header has {len(COLUMNS)}; separate them by commas"
+            f"{path}:{line}: {len(row)} fields, the header has {width}; separate them by commas{comma}"
         )
     sample = []
-    for name, position in zip(COLUMNS, order, strict=True):
-        value = decimal(row[position])
+    for name in COLUMNS:
+        value = decimal(row[order[name]]) if name in order else 0.0
         if value is None:
-            raise InputError(f"{path}:{line}: {name} is {row[position].strip()!r}; give a number")
+            text = row[order[name]].strip()
+            way_out = "write it with a decimal point" if "," in text else "give a number"
+            raise InputError(f"{path}:{line}: {name} is {text!r}; {way_out}")
         if not math.isfinite(value):
             raise InputError(f"{path}:{line}: {name} is {value}; fill or cut the gap")
         if name == "wind_speed" and value <= 0:
@@ -111,13 +125,20 @@ def _sample(path: Path, line: int, row: list[str], order: list[int]) -> list[flo
     return sample
 
 
-def _decimals(text: str) -> int:
-    """Digits behind the point of a number as it is written; 12, as good as exact, where it has an exponent."""
-    return 12 if "e" in text.lower() else len(text.strip().partition(".")[2])
+def _rounding(rows: Sequence[tuple[int, list[str]]], place: int) -> np.ndarray:
+    """How far (n,) [s] each time of a column may be from what was meant: half a unit of the last digit that any of them has, or of the
+    last bit, where all of them are single-precision numbers."""
+    written = [row[place].strip().lower() for _, row in rows]
+    time = np.array([float(text) for text in written])
+    digits = max(12 if "e" in text else len(text.partition(".")[2]) for text in written)
+    rounding = np.full(len(time), 0.5 * 10.0**-digits)
+    if np.array_equal(time, time.astype(np.float32)):
+        rounding = np.maximum(rounding, 0.5 * np.spacing(np.abs(time).astype(np.float32)).astype(float))
+    return rounding
 
 
-def _time_step(path: Path, lines: list[int], time: np.ndarray, rounding: float) -> float:
-    """The uniform step [s] of a column of times that starts at 0 and is written to within `rounding` [s].
+def _time_step(path: Path, lines: list[int], time: np.ndarray, rounding: np.ndarray) -> float:
+    """The uniform step [s] of a column of times that starts at 0, each written to within its `rounding` [s].
 
     Where every time can be a multiple of one step, it is the shortest such number: 0.00625 of 0.0063, 0.0125, 0.0188, ...
     """
@@ -131,9 +152,9 @@ def _time_step(path: Path, lines: list[int], time: np.ndarray, rounding: float) 
         raise InputError(f"{path}:{lines[i + 1]}: {order}; times must rise")
     usual = float(np.median(steps))
     count = np.arange(1, len(time))
-    slack = rounding * (1 + 1e-6)  # 0.00625 lies just half a digit from 0.0063
+    slack = rounding[1:] * (1 + 1e-6)  # 0.00625 lies just half a digit from 0.0063
     low, high = ((time[1:] - slack) / count).max(), ((time[1:] + slack) / count).min()
-    if low <= high and rounding <= COARSEST * usual:
+    if low <= high and rounding.max() <= COARSEST * usual:
         # twelve digits hold any step that was meant
         candidates = (float(f"{(low + high) / 2:.{digits}g}") for digits in range(1, 13))
         return next((step for step in candidates if low <= step <= high), (low + high) / 2)

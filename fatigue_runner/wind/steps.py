@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.values import unmasked
 from fatigue_runner.wind.checks import digest, signal_table
 from fatigue_runner.wind.source import WindSource
 
@@ -91,7 +92,7 @@ class StepWind(WindSource):
 def _step_times(times: Any) -> np.ndarray:
     """Step times (n,) [s], checked."""
     try:
-        times = np.array(times, float)
+        times = np.array(unmasked("step wind: times", times), float)
     except (TypeError, ValueError):
         raise InputError(f"step wind: times must be numbers in seconds, got {times!r}") from None
     if times.ndim != 1 or not len(times):

@@ -15,6 +15,7 @@ from fatigue_runner.wind import spectrum
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.mean_shear import one_profile
 from fatigue_runner.wind.section import Harmonics, Realisation, Site, WindSection
+from fatigue_runner.wind.streams import own_seeds
 from fatigue_runner.wind.strength import Strength
 
 # keys whose values are names of a table, and how these are spelled there
@@ -46,7 +47,8 @@ class TurbulentSection(WindSection):
     wind_class         `I`, `II` or `III`
     shear_exponent     power-law exponent alpha of the mean wind (default 0.2), or
     roughness_length   z_0 [m] of a logarithmic mean wind
-    seeds              how many seeds per speed (default 1), 1, 2, ... at each, or a list; one seed is another turbulence at every speed
+    seeds              how many per speed (default 1), numbers that no other speed has: 600001, 600002, ... at 6 m/s; or a list of
+                       numbers for every speed. One number is another turbulence at every speed
     harmonics          azimuthal harmonics that the blades feel: 6 (default) hold 98 % of every load range, 1 is mean and linear shears
     spectrum           `kaimal` (default) or `von-karman`
     """
@@ -89,12 +91,11 @@ class TurbulentSection(WindSection):
         return Strength(self.intensity, self.turbulence_class, self.turbulence, self.wind_class)
 
     def seeds_at(self, speed: float) -> list[int]:
-        """The seeds of the winds of a mean speed [m/s]: 1, 2, ..., or the list as it stands.
+        """The seeds of the winds of a mean speed [m/s]: as many as asked for, which no other speed has, or the list as it stands.
 
-        One seed is another turbulence at every speed (`streams.speed_stream`), so that more speeds or more seeds leave the others as
-        they are.
+        More speeds or more seeds leave the others as they are.
         """
-        return self.seeds if isinstance(self.seeds, list) else list(range(1, self.seeds + 1))
+        return self.seeds if isinstance(self.seeds, list) else own_seeds(speed, self.seeds)
 
     def realisations(self, site: Site) -> Iterator[Realisation]:
         keys = "intensity", "turbulence_class", "wind_class", "shear_exponent", "roughness_length"

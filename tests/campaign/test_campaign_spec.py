@@ -261,12 +261,44 @@ def test_the_paper_mixture_of_speeds_can_be_written(tmp_path):
     assert max(speeds) > 15
 
 
-def test_a_count_of_seeds_is_one_two_three_at_every_speed(tmp_path):
-    text = MINIMAL.replace(
-        "  speeds: 8", "  type: turbulent\n  speeds: [8, 10]\n  intensity: 0.1\n  seeds: 6"
-    )
-    wind = parse(tmp_path, text).wind
-    assert wind.seeds_at(8.0) == wind.seeds_at(10.0) == [1, 2, 3, 4, 5, 6]
+def test_a_count_of_seeds_is_numbers_that_no_other_speed_has_and_a_list_is_as_it_stands(tmp_path):
+    turbulent = "  type: turbulent\n  speeds: [8, 10]\n  intensity: 0.1\n  seeds: "
+    wind = parse(tmp_path, MINIMAL.replace("  speeds: 8", f"{turbulent}3")).wind
+    assert wind.seeds_at(8.0) == [800001, 800002, 800003] and wind.seeds_at(6.0)[0] == 600001
+    speeds = [
+        8,
+        8.0001,
+        8.0002,
+        8.00005,
+        8.123456789,
+        80.001,
+        0.8,
+        11.1,
+        *values([Range(start=3, stop=25, count=300)]),
+    ]
+    speeds += values([Random(random={"count": 500, "low": 5, "high": 10, "seed": 1})])
+    seeds = [seed for speed in dict.fromkeys(speeds) for seed in wind.seeds_at(speed)]
+    assert len(set(seeds)) == len(seeds) and max(seeds) < 2**63
+    assert parse(tmp_path, MINIMAL.replace("  speeds: 8", f"{turbulent}[7, 1, 7]")).wind.seeds_at(8.0) == [
+        7,
+        1,
+    ]
+
+
+@pytest.mark.parametrize("given", ["none", "None", "null", "~"])
+def test_no_reference_is_none_or_null(tmp_path, given):
+    assert parse(tmp_path, f"{MINIMAL}reference: {given}\n").reference is None
+
+
+def test_a_wohler_exponent_given_twice_is_one(tmp_path):
+    campaign = parse(tmp_path, MINIMAL + "fatigue: {wohler_exponents: [4, 4.0, 10]}\n")
+    assert campaign.fatigue.wohler_exponents == [4.0, 10.0]
+
+
+def test_wohler_exponents_that_print_alike_are_refused(tmp_path):
+    """They would have one column of the table."""
+    said = refusal(tmp_path, MINIMAL + "fatigue:\n  wohler_exponents: [4, 4.00000001]\n")
+    assert said.startswith("sweep.yaml:8: fatigue.wohler_exponents") and "m4" in said
 
 
 @given(

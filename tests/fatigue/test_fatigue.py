@@ -369,5 +369,26 @@ def test_importing_fatigue_loads_neither_numba_nor_the_simulation():
     ).stdout.split()
     loaded = {name for name in found if name.split(".")[0] in ("numba", "scipy", "fatigue_runner")}
     outside = {name for name in loaded if not name.startswith("fatigue_runner.fatigue")}
-    names = ("errors", "channels", "_version")
+    names = ("errors", "channels", "values", "_version")
     assert outside <= {"fatigue_runner", *(f"fatigue_runner.{name}" for name in names)}
+
+
+MASKED = np.ma.array([1.0, 9.0, 2.0], mask=[False, True, False])
+
+
+@pytest.mark.parametrize(
+    "figure",
+    [
+        lambda: fa.damage_equivalent_load(MASKED, 4, 1.0),
+        lambda: fa.equivalent_load(MASKED, [1, 1, 1], 4, 1.0),
+        lambda: fa.equivalent_load([1, 1, 1], MASKED, 4, 1.0),
+        lambda: fa.goodman([1, 1, 1], MASKED, 100.0),
+    ],
+)
+def test_what_lies_below_a_mask_has_no_load(figure):
+    with pytest.raises(fa.FatigueInputError, match="masked at index 1"):
+        figure()
+
+
+def test_a_masked_channel_is_a_stated_condition():
+    assert fa.channel_fatigue(MASKED, [4], 1.0).condition == "not finite from sample 1 of 3"

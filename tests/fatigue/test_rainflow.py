@@ -147,3 +147,13 @@ def test_lists_integers_single_precision_and_columns_count_alike_and_stay_as_the
     for values in (tuple(ASTM_SERIES), np.array(ASTM_SERIES, np.int32), np.float32(ASTM_SERIES), table[:, 1]):
         assert cycles(values) == ASTM_CYCLES
     np.testing.assert_array_equal(table, kept)
+
+
+def test_what_lies_below_a_mask_is_refused_and_an_open_mask_is_none():
+    """NumPy drops the mask of what becomes a plain array: the hidden 9 would count."""
+    hidden = np.ma.array([0.0, 5, 0, 9, 0], mask=[0, 0, 0, 1, 0])
+    with pytest.raises(InputError, match="masked at index 3") as refused:
+        rainflow(hidden)
+    assert isinstance(refused.value, ValueError)
+    for values in (np.ma.array(ASTM_SERIES), np.ma.array(ASTM_SERIES, mask=[False] * len(ASTM_SERIES))):
+        assert cycles(values) == ASTM_CYCLES

@@ -81,3 +81,55 @@ def test_a_file_is_whole_or_as_it_was(tmp_path):
         write_atomically(path, "no bytes")
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_a_file_is_read_in_every_encoding_that_yaml_knows(tmp_path, encoding):
+    """Windows' shells write UTF-16; YAML 1.2.2, 5.2."""
+    path = tmp_path / "a.yaml"
+    path.write_bytes("a: 1  # Wöhler\nb: ä\n".encode(encoding))
+    assert read_mapping(path, "thing", "a, b").data == {"a": 1, "b": "ä"}
+
+
+def test_another_encoding_is_told_with_line_and_way_out(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_bytes("a: 1\nb: Wöhler\n".encode("latin-1"))
+    with pytest.raises(InputError, match=r"a.yaml:2: .*byte 0xf6.*save it as UTF-8"):
+        read_mapping(path, "thing", "a, b")
+
+
+def test_a_git_lfs_pointer_is_told_as_one(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
+    with pytest.raises(InputError, match=r"Git LFS pointer.*git lfs pull"):
+        read_mapping(path, "thing", "a, b")
+
+
+def test_a_tab_behind_something_is_a_space_and_one_before_it_is_told():
+    """YAML 1.2.2, 6.6: the parser alone refuses the first, and calls the second no valid YAML."""
+    source = parse("a: 1\t\nb:\t2\t# s\n\t\n\t# note\nc: [1,\t2]\r\nd:\n  e: 3\t\n")
+    assert source.data == {"a": 1, "b": 2, "c": [1, 2], "d": {"e": 3}}
+    assert source.where(("d", "e")) == "a.yaml:7"
+    with pytest.raises(InputError, match=r"a.yaml:3: .* indented with a tab.*spaces"):
+        parse("a: 1\nb:\n\tc: 2\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [{b: rk4, c: 0,02}]\n", r"a.yaml:1: 0,02 is two entries.*0\.02"),
+        ("a:\n  - {c: 0,02, b: rk4}\n", r"a.yaml:2: 0,02 is two entries.*0\.02"),
+        ("a: 1\nb: {start: 3,5, stop: 4,5}\n", r"a.yaml:2: .*decimal point, not with a comma"),
+        ("a: 1_0.3\n", r"a.yaml:1: 1_0\.3 is no number"),
+        ("a: {b: [1, 2_0]}\n", r"a.yaml:1: 2_0 is no number"),
+    ],
+)
+def test_what_yaml_takes_for_another_number_is_refused(text, message):
+    with pytest.raises(InputError, match=message):
+        parse(text)
+
+
+def test_texts_with_commas_and_underscores_stay_texts():
+    assert parse("a: 1_0.x\nb: '1_0'\nc: v1_2\nd: {e: '0,02', f: }\n").data == {
+        "a": "1_0.x", "b": "1_0", "c": "v1_2", "d": {"e": "0,02", "f": None}
+    }  # fmt: skip

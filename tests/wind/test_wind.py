@@ -313,10 +313,15 @@ def test_the_same_samples_make_the_same_wind_as_the_file(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"gust\.csv:1: the file is empty"),
+        ("", r"gust\.csv: the wind file is empty"),
         ("0,8,0,0\n1,8,0,0\n", r"gust\.csv:1: unknown column '0'"),
         ("time,speed,vertical_shear,horizontal_shear\n", r"gust\.csv:1: unknown column 'speed'.*wind_speed"),
-        ("time,wind_speed,vertical_shear\n0,8,0\n", r"gust\.csv:1: column 'horizontal_shear' is missing"),
+        ("time,vertical_shear\n0,0\n", r"gust\.csv:1: column 'wind_speed' is missing"),
+        (
+            HEADER + '0,8,0,0\n1,"8,5",0,0\n',
+            r"gust\.csv:3: wind_speed is '8,5'; write it with a decimal point",
+        ),
+        (HEADER + "0,8,0,0\n1,8,5,0,0\n", r"gust\.csv:3: 5 fields, the header has 4.*decimal point"),
         (
             "time,time,wind_speed,vertical_shear,horizontal_shear\n",
             r"gust\.csv:1: column 'time' appears twice",
@@ -351,7 +356,10 @@ def test_a_wrong_file_is_refused_with_its_line(tmp_path, text, message):
         read_wind_file(written(tmp_path, text))
 
 
-@pytest.mark.parametrize(("step", "digits"), [(0.00625, 4), (1 / 3, 2), (0.05, 2), (1 / 60, 4), (0.1, 12)])
+@pytest.mark.parametrize(
+    ("step", "digits"),
+    [(0.00625, 4), (1 / 3, 2), (0.05, 2), (1 / 60, 4), (0.1, 12), (1 / 16, 2), (1 / 64, 3), (1 / 128, 3)],
+)
 def test_times_that_were_rounded_when_they_were_written_are_those_of_a_uniform_step(tmp_path, step, digits):
     rows = "".join(f"{step * i:.{digits}f},8,0,0\n" for i in range(1000))
     found = read_wind_file(written(tmp_path, HEADER + rows)).time_step
@@ -359,6 +367,40 @@ def test_times_that_were_rounded_when_they_were_written_are_those_of_a_uniform_s
     assert found == pytest.approx(step, abs=1e-3 * 10.0**-digits)
     if step in (0.00625, 0.05, 0.1):
         assert found == step
+
+
+@pytest.mark.parametrize("step", [0.01, 0.05, 1 / 3])
+def test_times_of_single_precision_are_those_of_a_uniform_step(tmp_path, step):
+    """Written with all digits of a double: at 600 s they are up to 3e-5 s off."""
+    rows = "".join(f"{float(np.float32(step * i))!r},8,0,0\n" for i in range(round(600 / step)))
+    assert read_wind_file(written(tmp_path, HEADER + rows)).time_step == pytest.approx(step, rel=1e-7)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-8-sig"])
+def test_shears_that_a_file_has_not_are_zero(tmp_path, encoding):
+    source = read_wind_file(written(tmp_path, "time,wind_speed\n0,8\n0.5,9\n", encoding=encoding))
+    assert source.values.tolist() == [[8.0, 0.0, 0.0], [9.0, 0.0, 0.0]]
+
+
+def test_a_text_that_is_no_utf_8_is_told_with_its_line(tmp_path):
+    with pytest.raises(InputError, match=r"gust\.csv:2: .*save it as UTF-8"):
+        read_wind_file(written(tmp_path, "time,wind_speed\n0,8\xe4\n", encoding="latin-1"))
+
+
+MASKED = np.ma.array([8.0, 9.0, 8.0], mask=[False, True, False])
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: SeriesWind(0.5, MASKED),
+        lambda: StepWind([0.0, 1.0, 2.0], MASKED),
+        lambda: StepWind(MASKED - 8, [8.0, 9.0, 8.0]),
+    ],
+)
+def test_a_masked_sample_is_refused_and_what_lies_below_the_mask_does_not_blow(make):
+    with pytest.raises(InputError, match="masked at index 1"):
+        make()
 
 
 def test_a_missing_or_binary_file_is_refused_by_name(tmp_path):

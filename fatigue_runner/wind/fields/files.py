@@ -6,9 +6,8 @@ import struct
 from pathlib import Path
 from typing import Any
 
+from fatigue_runner.encoded import refuse_pointer
 from fatigue_runner.errors import InputError
-
-LFS = b"version https://git-lfs"
 
 
 def read_bytes(path: Path) -> bytes:
@@ -21,10 +20,7 @@ def read_bytes(path: Path) -> bytes:
         raise InputError(f"{path}: the wind file cannot be read ({error.strerror}); check the path") from None
     if not data:
         raise InputError(f"{path}: the wind file is empty; make it anew")
-    if data.startswith(LFS):
-        raise InputError(
-            f"{path}: this is a Git LFS pointer, not the wind field itself; fetch it with 'git lfs pull'"
-        )
+    refuse_pointer(data, path, "the wind field")
     return data
 
 

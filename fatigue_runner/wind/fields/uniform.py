@@ -22,8 +22,9 @@ from pathlib import Path
 import numpy as np
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.values import decimal
 from fatigue_runner.wind.azimuth import radial_shares, whole_harmonics
-from fatigue_runner.wind.checks import decimal, number
+from fatigue_runner.wind.checks import number
 from fatigue_runner.wind.fields.files import read_text
 from fatigue_runner.wind.fields.projection import FieldHarmonics
 from fatigue_runner.wind.profiles import PowerLaw, profile_amplitudes, profile_disc_fit, refuse_ground
