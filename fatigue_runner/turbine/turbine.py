@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,7 +37,9 @@ class Turbine:
     """One turbine of the type T2B1i1cG. `parameters` by `equations.PARAMETERS` [SI], at zero pitch.
 
     control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it;
-    tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees.
+    tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees;
+    sections {name: (outer diameter, wall) [m]}: circles whose wear is counted, which change no motion;
+    operating_wind: from cut-in to cut-out [m/s], None where the file does not say.
     """
 
     name: str
@@ -48,6 +50,8 @@ class Turbine:
     control: Mapping[str, Any] | None = None
     operation: str = FIXED
     tower: tuple[tuple[float, float], ...] = ()
+    sections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    operating_wind: tuple[float, float] | None = None
 
     @property
     def layout(self) -> Layout:
@@ -320,7 +324,22 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     given = data.get("control") if data["generator"]["law"] == "regions" else None
     control = Control.model_validate(given).model_dump() if given else None
     tower = tuple((float(height), float(diameter)) for height, diameter in data["tower"].get("diameters", ()))
-    return Turbine(name, parameters, tables, str(data.get("description", "")), control=control, tower=tower)
+    sections = {
+        where: (float(circle["diameter"]), float(circle["wall"]))
+        for where, circle in (data.get("sections") or {}).items()
+        if circle
+    }
+    wind = data.get("operating_wind")
+    return Turbine(
+        name,
+        parameters,
+        tables,
+        str(data.get("description", "")),
+        control=control,
+        tower=tower,
+        sections=sections,
+        operating_wind=None if wind is None else (float(wind[0]), float(wind[1])),
+    )
 
 
 def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:
