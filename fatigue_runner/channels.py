@@ -5,7 +5,7 @@ Moments are about the blade-root and tower-base axes as OpenFAST's RootMyb/RootM
 
 from __future__ import annotations
 
-from fatigue_runner.layout import HARMONICS, T2B1I1CG
+from fatigue_runner.layout import HARMONICS, T2B1I1CG, T2B2CG
 from fatigue_runner.layout import Channel as Channel
 
 STATES = T2B1I1CG.states
@@ -49,7 +49,7 @@ FATIGUE_CHANNELS = (
     "tower_base_side_side_moment",
 )
 
-BY_NAME = {c.name: c for c in (*STATES, *WIND_SIGNALS, *WIND_HARMONICS, *LOADS)}
+BY_NAME = {c.name: c for c in (*STATES, *T2B2CG.states, *WIND_SIGNALS, *WIND_HARMONICS, *LOADS)}
 
 
 def wind_channels(columns: int) -> tuple[Channel, ...]:

@@ -9,7 +9,7 @@ A new state or signal is one entry here, or one entry of a layout that is derive
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -264,17 +264,29 @@ def triples(signals: Iterable[Channel]) -> int:
 
 PITCH = Channel("pitch", "rad", "blade pitch", "deg", DEGREES)
 
-# CADynTurb's T2B1i1cG: two tower modes, one flap mode of each blade, a collective edge mode, rotor and generator
-T2B1I1CG = Layout(
-    coordinates=(
-        _metres("tower_fore_aft", "tower-top fore-aft"),
-        _metres("tower_side_side", "tower-top side-side"),
-        *(_metres(f"blade{i}_flap", f"blade {i} flap", blade=i, nudge=1e-3) for i in (1, 2, 3)),
-        _metres("edge", "collective edge"),
-        _turning("rotor_azimuth", "rotor azimuth", "rotor_speed", "rotor speed", 1e-6),
-        _turning(
-            "generator_azimuth", "generator azimuth (high-speed side)", "generator_speed", "generator speed", 1e-4
-        ),
+_TOWER = (
+    _metres("tower_fore_aft", "tower-top fore-aft"),
+    _metres("tower_side_side", "tower-top side-side"),
+)
+_FLAPS = tuple(_metres(f"blade{i}_flap", f"blade {i} flap", blade=i, nudge=1e-3) for i in (1, 2, 3))
+_EDGES = tuple(_metres(f"blade{i}_edge", f"blade {i} edge", blade=i) for i in (1, 2, 3))
+_DRIVETRAIN = (
+    _turning("rotor_azimuth", "rotor azimuth", "rotor_speed", "rotor speed", 1e-6),
+    _turning(
+        "generator_azimuth", "generator azimuth (high-speed side)", "generator_speed", "generator speed", 1e-4
     ),
-    wind=WIND,
 )  # fmt: skip
+
+# CADynTurb's models: two tower modes, one flap mode of each blade, a collective edge mode (T2B1i1cG) or one of each blade (T2B2cG),
+# rotor and generator
+T2B1I1CG = Layout((*_TOWER, *_FLAPS, _metres("edge", "collective edge"), *_DRIVETRAIN), WIND)
+T2B2CG = Layout((*_TOWER, *_FLAPS, *_EDGES, *_DRIVETRAIN), WIND)
+FAMILIES = {"t2b1i1cg": T2B1I1CG, "t2b2cg": T2B2CG}
+
+
+def family_of(names: Sequence[str]) -> str | None:
+    """The member of the family whose states begin a list of names, in any order; None where there is none."""
+    for family, layout in FAMILIES.items():
+        if set(layout.names) <= set(names):
+            return family
+    return None

@@ -112,15 +112,7 @@ NO_STATES = {
         "numbers of the interpolant",
         {"rows[0, 6]", "rows[0, 7]", "w[o, 6]", "w[o, 7]", "weights[0, 6]", "weights[0, 7]"},
     ),
-    "turbine/steady.py": ("unknowns of the operating point", {"found.x[7]", "unknown[7]"}),
     "wind/fields/uniform.py": ("columns of the file", {"self.values[:, 6]", "values[:, [1, 7]]"}),
-}
-# Rows of states that are still written as numbers: {file: (why, expressions)}. The list may only shrink.
-STILL_ROWS = {
-    "turbine/derivation/equations.py": (
-        "the text of the equations, which reads as it is",
-        {"ACCELERATION[6]", "ACCELERATION[7]", "STATE[6]", "STATE[7]", "STATE[14]", "STATE[15]"},
-    ),
 }
 
 
@@ -162,12 +154,7 @@ def numbers(node: ast.AST) -> set[int]:
 
 def test_no_state_has_a_number_outside_of_the_layout():
     found = {(name, text) for name, tree in TREES.items() if name != "layout.py" for text in row_like(tree)}
-    listed = {
-        (name, text)
-        for known in (NO_STATES, STILL_ROWS)
-        for name, (_, texts) in known.items()
-        for text in texts
-    }
+    listed = {(name, text) for name, (_, texts) in NO_STATES.items() for text in texts}
     assert sorted(found - listed) == [], "ask the layout for the row or the width (layout.py)"
     assert sorted(listed - found) == [], "gone: take it off the list"
 

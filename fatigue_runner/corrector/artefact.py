@@ -18,7 +18,7 @@ from fatigue_runner.corrector.corrector import Corrector
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.maps import MAPS, map_class
-from fatigue_runner.layout import T2B1I1CG, Channel, FirstOrder, Layout
+from fatigue_runner.layout import FAMILIES, T2B1I1CG, Channel, FirstOrder, Layout, family_of
 
 FORMAT = "fatigue-runner corrector 1"
 _FACTS = ("wind_range", "validation", "training", "recipe", "licence")
@@ -69,12 +69,12 @@ def _layout(header: dict[str, Any]) -> Layout:
     """The layout whose names the header has. Raises CorrectorError for other equations than this program's."""
     if "states" not in header:
         return T2B1I1CG
-    (own, blown), (states, wind) = (
-        (named["states"], named["wind"]) for named in (_signals(T2B1I1CG), header)
-    )
+    states, wind = header["states"], header["wind"]
+    layout = FAMILIES[family_of(states) or "t2b1i1cg"]
+    own, blown = _signals(layout).values()
     if states[: len(own)] != own or wind[: len(blown)] != blown:
         raise CorrectorError(f"corrector {header['name']} is for other states or winds than this program has")
-    return T2B1I1CG.extended(
+    return layout.extended(
         first_order=tuple(FirstOrder(Channel(name, "", name, "")) for name in states[len(own) :]),
         wind=tuple(Channel(name, "", name, "") for name in wind[len(blown) :]),
     )

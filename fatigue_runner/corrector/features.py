@@ -14,15 +14,16 @@ STAGE_AWARE, RAW, MULTI_BLADE = "stage-aware", "raw", "multi-blade"
 FACTORS = ("sin_azimuth", "cos_azimuth", "wind_speed@start", "rotor_speed")
 MULTI_BLADE_FACTORS = ("wind_speed@start", "rotor_speed")
 # the edge mode and the shaft, and their rates: the largest errors of a run; what a robust fit watches
-DRIVE = ("edge", "generator_azimuth", "edge_velocity", "rotor_speed", "generator_speed")
+DRIVE = ("generator_azimuth", "rotor_speed", "generator_speed")
 
 MOST_HISTORY = 4  # steps
 MOST_ROWS = 512  # room of the compiled loop for features and their products
 
 
 def drive(layout: Layout) -> tuple[int, ...]:
-    """Rows of `DRIVE` in the state."""
-    return tuple(layout.row(name) for name in DRIVE)
+    """Rows of the edge modes, the shaft, and their rates in the state, in its order."""
+    edges = [name for name in layout.names if "edge" in name]
+    return tuple(sorted(layout.row(name) for name in (*edges, *DRIVE)))
 
 
 def _relative(layout: Layout) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fatigue_runner.channels import BY_NAME, STATE_NAMES
+from fatigue_runner.channels import BY_NAME
 from fatigue_runner.integrators.methods import METHODS
 from fatigue_runner.integrators.stability import stability_limit
 from fatigue_runner.turbine import load_turbine
@@ -87,7 +87,7 @@ def _means_over_a_revolution(turbine: Turbine, wind: float, pitch: float) -> dic
     azimuths = np.arange(24) * 2 * np.pi / 24
     states = np.array([turbine.operating_point(wind, azimuth=azimuth, pitch=pitch) for azimuth in azimuths])
     signals = np.tile([wind, 0.0, 0.0], (len(azimuths), 1))
-    series = dict(zip(STATE_NAMES, states.T, strict=True)) | turbine.loads(states, signals, pitch)
+    series = dict(zip(turbine.layout.names, states.T, strict=True)) | turbine.loads(states, signals, pitch)
     return {name: float(np.mean(values)) for name, values in series.items()}
 
 

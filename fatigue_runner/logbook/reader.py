@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fatigue_runner import channels
+from fatigue_runner.layout import FAMILIES, family_of
 from fatigue_runner.logbook import generic
 from fatigue_runner.logbook.columns import EXTRA_STATUS, STATUS_ARRAYS
 from fatigue_runner.logbook.contents import Contents, read_contents
@@ -163,7 +164,7 @@ def assemble(tables: Tables, rows: int, intervals: int, contents: Contents) -> L
     loads = tables.get("loads", {})
     status = tables.get("status", {})
     units = contents.metadata.get("units", {})
-    states, winds = (*channels.STATES, *_own("state", tables, units)), _winds(tables, units)
+    states, winds = _states(tables, units), _winds(tables, units)
     log = Log(
         time[:rows],
         matrix("state", [c.name for c in states]),
@@ -190,6 +191,13 @@ def _own(key: str, tables: Tables, units: Mapping[str, str]) -> tuple[channels.C
         return channels.BY_NAME.get(name) or channels.Channel(name, unit, name.replace("_", " "), unit)
 
     return tuple(channel(name) for name in TOPICS[key].further(tables.get(key, ())))
+
+
+def _states(tables: Tables, units: Mapping[str, str]) -> tuple[channels.Channel, ...]:
+    """Those of the turbine's family, then the log's own."""
+    family = FAMILIES[family_of(tuple(tables.get("state", ()))) or "t2b1i1cg"].states
+    names = {c.name for c in family}
+    return (*family, *(c for c in _own("state", tables, units) if c.name not in names))
 
 
 def _winds(tables: Tables, units: Mapping[str, str]) -> tuple[channels.Channel, ...]:

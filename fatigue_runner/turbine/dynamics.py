@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fatigue_runner.control import BASELINE
 from fatigue_runner.errors import InputError
-from fatigue_runner.layout import T2B1I1CG, Layout
+from fatigue_runner.layout import FAMILIES, Layout
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine.model import Model
@@ -28,24 +28,32 @@ class Dynamics:
     model: Callable[[bool, bool], Model]
 
 
-def _uncontrolled(varying_pitch: bool, harmonics: bool) -> Model:
-    from fatigue_runner.turbine import model
+def _uncontrolled(family: str) -> Dynamics:
+    def model(varying_pitch: bool, harmonics: bool) -> Model:
+        from fatigue_runner.turbine.model import MODELS
 
-    if varying_pitch:
-        return model.VARYING_PITCH_HARMONIC if harmonics else model.VARYING_PITCH
-    return model.HARMONIC if harmonics else model.FIXED_PITCH
+        kind = "pitched" if varying_pitch else "kernel"
+        if harmonics:
+            kind = "pitched_harmonic" if varying_pitch else "harmonic"
+        return MODELS[family][kind]
 
-
-def _controlled(varying_pitch: bool, harmonics: bool) -> Model:
-    from fatigue_runner.turbine import model
-
-    if varying_pitch:
-        raise InputError(
-            "a controller makes the pitch itself; give no pitch over time, or use operation: fixed"
-        )
-    return model.CONTROLLED
+    return Dynamics(FAMILIES[family], model)
 
 
-UNCONTROLLED = Dynamics(T2B1I1CG, _uncontrolled)
-# its wind may have harmonics or none
-BASELINE_CONTROLLED = Dynamics(T2B1I1CG.extended(first_order=BASELINE.states, harmonics=True), _controlled)
+def _controlled(family: str) -> Dynamics:
+    def model(varying_pitch: bool, harmonics: bool) -> Model:
+        from fatigue_runner.turbine.model import MODELS
+
+        if varying_pitch:
+            raise InputError(
+                "a controller makes the pitch itself; give no pitch over time, or use operation: fixed"
+            )
+        return MODELS[family]["controlled"]
+
+    # its wind may have harmonics or none
+    return Dynamics(FAMILIES[family].extended(first_order=BASELINE.states, harmonics=True), model)
+
+
+# by the turbine's model
+UNCONTROLLED = {family: _uncontrolled(family) for family in FAMILIES}
+BASELINE_CONTROLLED = {family: _controlled(family) for family in FAMILIES}

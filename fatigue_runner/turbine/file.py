@@ -18,6 +18,7 @@ from fatigue_runner import shipped
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, known_name, problem, validated
 from fatigue_runner.inputs.source import Source, read_mapping
+from fatigue_runner.layout import FAMILIES
 from fatigue_runner.turbine import beam
 from fatigue_runner.turbine.tables import INTERPOLATIONS
 
@@ -277,30 +278,11 @@ class Aerodynamics(Section):
         return self
 
 
-class CircleSection(Section):
-    """A circular section by its outer diameter and wall [m]."""
-
-    diameter: Positive
-    wall: Positive
-
-    @model_validator(mode="after")
-    def _fits(self) -> CircleSection:
-        if not 2 * self.wall < self.diameter:
-            raise problem(f"{self.wall:g} m does not fit into a diameter of {self.diameter:g} m", key="wall")
-        return self
-
-
-class Sections(Section):
-    """Where wear is counted; no motion depends on it."""
-
-    tower_base: CircleSection | None = None
-    blade_root: CircleSection | None = None
-
-
 class TurbineFile(Section):
     """A whole turbine file, its base merged in."""
 
     name: str = Field(min_length=1)
+    model: str = "t2b1i1cg"
     description: str = ""
     source: str = ""
     environment: Environment
@@ -312,16 +294,12 @@ class TurbineFile(Section):
     control: Control | None = None
     blade: Blade
     tower: Tower
-    sections: Sections | None = None
-    operating_wind: list[float] | None = Field(default=None, min_length=2, max_length=2)
     aerodynamics: Aerodynamics
 
-    @field_validator("operating_wind")
+    @field_validator("model")
     @classmethod
-    def _from_cut_in_to_cut_out(cls, wind: list[float] | None) -> list[float] | None:
-        if wind is not None and not 0 <= wind[0] < wind[1]:
-            raise problem(f"must be [cut-in, cut-out] in m/s, rising; got {wind}")
-        return wind
+    def _known_model(cls, model: str) -> str:
+        return known_name(model, FAMILIES)
 
 
 class AirfoilFile(Section):

@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -23,8 +24,7 @@ from numpy.typing import NDArray
 
 from fatigue_runner.compiled import INLINE, njit
 from fatigue_runner.control import BASELINE
-from fatigue_runner.layout import PITCH, T2B1I1CG, Layout
-from fatigue_runner.turbine.generated import controlled, harmonic, kernel, pitched, pitched_harmonic
+from fatigue_runner.layout import FAMILIES, PITCH, Layout
 from fatigue_runner.turbine.lane_code import LANES
 
 Array = NDArray[np.float64]
@@ -171,12 +171,25 @@ def loads(model, x, wind, control, derivative, out, start, data):
     _loads(model, x, wind, control, derivative, out, start, data)
 
 
-FIXED_PITCH = Model("fixed-pitch", kernel, T2B1I1CG)
-VARYING_PITCH = Model("varying-pitch", pitched, T2B1I1CG.extended(control=(PITCH,)))
-HARMONIC = Model("fixed-pitch-harmonic", harmonic, FIXED_PITCH.layout.extended(harmonics=True))
-CONTROLLED = Model(
-    "controlled", controlled, FIXED_PITCH.layout.extended(first_order=BASELINE.states, harmonics=True)
-)
-VARYING_PITCH_HARMONIC = Model(
-    "varying-pitch-harmonic", pitched_harmonic, VARYING_PITCH.layout.extended(harmonics=True)
-)
+def _models(family: str, prefix: str = "") -> dict[str, Model]:
+    """Every set of equations of one member of the family, by what it takes and has beside the turbine's states."""
+    layout = FAMILIES[family]
+    pitched = layout.extended(control=(PITCH,))
+    layouts = {
+        "kernel": ("fixed-pitch", layout),
+        "pitched": ("varying-pitch", pitched),
+        "harmonic": ("fixed-pitch-harmonic", layout.extended(harmonics=True)),
+        "pitched_harmonic": ("varying-pitch-harmonic", pitched.extended(harmonics=True)),
+        "controlled": ("controlled", layout.extended(first_order=BASELINE.states, harmonics=True)),
+    }
+    return {
+        name: Model(
+            f"{family}-{title}" if prefix else title,
+            import_module(f"{__package__}.generated.{prefix}{name}"),
+            own,
+        )
+        for name, (title, own) in layouts.items()
+    }
+
+
+MODELS = {"t2b1i1cg": _models("t2b1i1cg"), "t2b2cg": _models("t2b2cg", "t2b2cg_")}

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.layout import T2B1I1CG, Layout
+from fatigue_runner.layout import BLADES, Layout
 
 Array = NDArray[np.float64]
 
@@ -37,37 +37,70 @@ class Equations(Protocol):
 
 AZIMUTHS = 24  # of one revolution; three blades and up to the second harmonic repeat well within them
 
+# What is unknown of a steady rotation, in the layout's order: a deflection, or the mean, cosine and sine part over the azimuth of a
+# blade set; then the shaft's twist and the rotor's speed; then first-order states. Per coordinate: size of its deflection and of
+# its swing, where the search starts at a wind speed, and what its acceleration is divided by.
+_TOWER = {"tower_fore_aft": (0.1, 1.0), "tower_side_side": (0.01, -0.5)}
+_DRIVE = (1e-3, 2.0)
 
-# rows of T2B1i1cG by what they are here; first-order states follow them where a turbine has any
-_FREEDOMS = T2B1I1CG.freedoms
-_FORE_AFT, _SIDE_SIDE = T2B1I1CG.row("tower_fore_aft"), T2B1I1CG.row("tower_side_side")
-_FLAP = T2B1I1CG.blade_sets[0]
-_FLAPS, _FLAP_RATES = slice(_FLAP, _FLAP + 3), slice(_FREEDOMS + _FLAP, _FREEDOMS + _FLAP + 3)
-_EDGE = T2B1I1CG.row("edge")
-_ROTOR, _GENERATOR = T2B1I1CG.rotor, T2B1I1CG.generator
-_SPEED, _GENERATOR_SPEED = T2B1I1CG.rotor_speed, T2B1I1CG.generator_speed
-_UNKNOWNS = 8  # of a steady rotation, before the first-order states
+
+def _sizes(layout: Layout) -> tuple[list[float], list[float]]:
+    """Size of every unknown, and where its search starts by that size; the flap's for a wind of 1 m/s."""
+    size, start = [], []
+    for row in _firsts(layout):
+        name = layout.coordinates[row].position.name
+        own, begin = _TOWER.get(name, (1.0, 0.35) if name.endswith("flap") else (0.1, 0.1))
+        swing = 2 if row in layout.blade_sets else 0
+        size += [own, *[0.1] * swing]
+        start += [begin, *[0.0] * swing]
+    slow = [1e4 * s.nudge for s in layout.first_order]
+    return [*size, _DRIVE[0], 1.0, *slow], [*start, _DRIVE[1]]
+
+
+def _firsts(layout: Layout) -> list[int]:
+    """Rows of the deflections, of a blade set the first."""
+    return [i for i in range(layout.deflections) if layout.coordinates[i].blade <= 1]
+
+
+def _flap_row(layout: Layout) -> int:
+    """Number of the flap's mean among the unknowns."""
+    return _firsts(layout).index(layout.row("blade1_flap"))
+
+
+def _speed_row(layout: Layout) -> int:
+    """Number of the rotor's speed among the unknowns."""
+    return len(_firsts(layout)) + 2 * len(layout.blade_sets) + 1
 
 
 def _states(layout: Layout, unknown: Array, azimuths: Array, ratio: float) -> Array:
-    """(size, n) from (fore-aft, side-side, flap, its cosine and sine over the azimuth, edge, shaft twist, rotor speed) and the
-    first-order states."""
-    a, s, f, fc, fs, e, twist, speed = unknown[:_UNKNOWNS]
+    """(size, n) from the unknowns."""
+    values = iter(unknown[: _speed_row(layout) - 1])
+    twist, speed = unknown[_speed_row(layout) - 1 : _speed_row(layout) + 1]
     x = np.zeros((layout.size, len(azimuths)))
-    psi = azimuths + np.arange(3)[:, None] * 2 * np.pi / 3
-    x[_FORE_AFT], x[_SIDE_SIDE], x[_EDGE] = a, s, e
-    x[_FLAPS] = f + fc * np.cos(psi) + fs * np.sin(psi)
-    x[_FLAP_RATES] = speed * (fs * np.cos(psi) - fc * np.sin(psi))
-    x[_ROTOR], x[_GENERATOR] = azimuths, ratio * (azimuths - twist)
-    x[_SPEED], x[_GENERATOR_SPEED] = speed, ratio * speed
-    x[layout.first_order_rows] = unknown[_UNKNOWNS:, None]
+    psi = azimuths + np.arange(BLADES)[:, None] * 2 * np.pi / BLADES
+    for row in _firsts(layout):
+        if row in layout.blade_sets:
+            mean, cosine, sine = next(values), next(values), next(values)
+            blades, rates = _set(layout, row)
+            x[blades] = mean + cosine * np.cos(psi) + sine * np.sin(psi)
+            x[rates] = speed * (sine * np.cos(psi) - cosine * np.sin(psi))
+        else:
+            x[row] = next(values)
+    x[layout.rotor], x[layout.generator] = azimuths, ratio * (azimuths - twist)
+    x[layout.rotor_speed], x[layout.generator_speed] = speed, ratio * speed
+    x[layout.first_order_rows] = unknown[_speed_row(layout) + 1 :, None]
     return x
+
+
+def _set(layout: Layout, row: int) -> tuple[slice, slice]:
+    """Rows of a blade set, and of its rates."""
+    return slice(row, row + BLADES), slice(layout.freedoms + row, layout.freedoms + row + BLADES)
 
 
 def _steady(
     turbine: Equations, wind: float, vertical_shear: float, horizontal_shear: float, pitch: float
 ) -> Array:
-    """The unknowns of `_states` that balance the mean of every equation, and the once-per-revolution part of the flap's.
+    """The unknowns of `_states` that balance the mean of every equation, and the once-per-revolution part of the blade sets'.
 
     First-order states are constant over the revolution, their slopes zero in the mean.
     """
@@ -77,28 +110,39 @@ def _steady(
         raise InputError(f"operating point: the wind speed must be positive, got {wind} m/s")
     p, layout = turbine.parameters, turbine.layout
     ratio, azimuths = p["g_ratio"], np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
-    psi = azimuths + np.arange(3)[:, None] * 2 * np.pi / 3
-    own = np.array([1e4 * s.nudge for s in layout.first_order])
-    scale = np.array([0.1, 0.01, 1.0, 0.1, 0.1, 0.1, 1e-3, 1.0, *own])
+    psi = azimuths + np.arange(BLADES)[:, None] * 2 * np.pi / BLADES
+    sizes, begin = _sizes(layout)
+    own, scale, freedoms = (
+        np.array([1e4 * s.nudge for s in layout.first_order]),
+        np.array(sizes),
+        layout.freedoms,
+    )
+    at_speed = _speed_row(layout)
 
     def residual(z: Array) -> Array:
         unknown = z * scale
         x = _states(layout, unknown, azimuths, ratio)
-        acc = turbine.rhs(x, wind, vertical_shear, horizontal_shear, pitch)[_FREEDOMS:]
-        swing = x[_FLAPS] - unknown[2]
-        flap = (acc[_FLAPS] + unknown[7] ** 2 * swing) / 50
+        acc = turbine.rhs(x, wind, vertical_shear, horizontal_shear, pitch)[freedoms:]
         mean = acc.mean(axis=1)
-        harmonics = (flap * np.cos(psi)).mean(), (flap * np.sin(psi)).mean()
-        drive = mean[_ROTOR], mean[_GENERATOR] / ratio
-        more = mean[_FREEDOMS:] / own
-        tower = mean[_FORE_AFT], mean[_SIDE_SIDE]
-        return np.array([*tower, flap.mean(), *harmonics, mean[_EDGE] / 50, *drive, *more])
+        out, number = [], 0
+        for row in _firsts(layout):
+            if row in layout.blade_sets:
+                blades, _ = _set(layout, row)
+                swing = x[blades] - unknown[number]
+                blade = (acc[blades] + unknown[at_speed] ** 2 * swing) / 50
+                out += [blade.mean(), (blade * np.cos(psi)).mean(), (blade * np.sin(psi)).mean()]
+                number += BLADES
+            else:
+                out.append(mean[row] if layout.coordinates[row].position.name in _TOWER else mean[row] / 50)
+                number += 1
+        drive = mean[layout.rotor], mean[layout.generator] / ratio
+        return np.array([*out, *drive, *(mean[freedoms:] / own)])
 
     guesses, slowest = turbine.guesses(wind)
+    begin[_flap_row(layout)] *= wind
     for speed, states in guesses:
-        start = np.array([1.0, -0.5, wind * 0.35, 0.0, 0.0, 0.1, 2.0, speed, *(states / own)])
-        found = root(residual, start, tol=1e-11)
-        if found.success and np.abs(found.fun).max() < 1e-6 and found.x[7] > slowest:
+        found = root(residual, np.array([*begin, speed, *(states / own)]), tol=1e-11)
+        if found.success and np.abs(found.fun).max() < 1e-6 and found.x[at_speed] > slowest:
             return found.x * scale
     raise InputError(
         f"{turbine.name} has no steady rotation at {wind:g} m/s and {np.degrees(pitch):g} deg pitch; "
@@ -119,16 +163,19 @@ def operating_point(
     return _states(turbine.layout, unknown, np.array([azimuth]), turbine.parameters["g_ratio"])[:, 0]
 
 
-def _multiblade(azimuth: float, speed: float) -> tuple[Array, Array, Array]:
-    """T, dT/dt, d2T/dt2 (8, 8): blade flaps from their mean, cosine and sine parts (Coleman's transformation)."""
-    psi = azimuth + np.arange(3) * 2 * np.pi / 3
-    parts = [np.column_stack([np.ones(3), np.cos(psi), np.sin(psi)])]
-    parts.append(speed * np.column_stack([np.zeros(3), -np.sin(psi), np.cos(psi)]))
-    parts.append(-(speed**2) * np.column_stack([np.zeros(3), np.cos(psi), np.sin(psi)]))
+def _multiblade(layout: Layout, azimuth: float, speed: float) -> tuple[Array, Array, Array]:
+    """T, dT/dt, d2T/dt2 (freedoms, freedoms): blade sets from their mean, cosine and sine parts (Coleman's transformation)."""
+    psi = azimuth + np.arange(BLADES) * 2 * np.pi / BLADES
+    none = np.zeros(BLADES)
+    parts = [np.column_stack([np.ones(BLADES), np.cos(psi), np.sin(psi)])]
+    parts.append(speed * np.column_stack([none, -np.sin(psi), np.cos(psi)]))
+    parts.append(-(speed**2) * np.column_stack([none, np.cos(psi), np.sin(psi)]))
     out = []
     for i, block in enumerate(parts):
-        t = np.eye(_FREEDOMS) if i == 0 else np.zeros((_FREEDOMS, _FREEDOMS))
-        t[_FLAPS, _FLAPS] = block
+        t = np.eye(layout.freedoms) if i == 0 else np.zeros((layout.freedoms, layout.freedoms))
+        for row in layout.blade_sets:
+            blades, _ = _set(layout, row)
+            t[blades, blades] = block
         out.append(t)
     return out[0], out[1], out[2]
 
@@ -136,20 +183,20 @@ def _multiblade(azimuth: float, speed: float) -> tuple[Array, Array, Array]:
 def linearised(turbine: Equations, wind: float, pitch: float = 0.0) -> Array:
     """(size, size) state matrix about the operating point in multiblade coordinates, averaged over the azimuth."""
     unknown = _steady(turbine, wind, 0.0, 0.0, pitch)
-    ratio, speed = turbine.parameters["g_ratio"], unknown[7]
     layout = turbine.layout
+    ratio, speed, freedoms = turbine.parameters["g_ratio"], unknown[_speed_row(layout)], layout.freedoms
     size, q, rates, more = layout.size, layout.positions, layout.velocities, layout.first_order_rows
     total, delta = np.zeros((size, size)), np.array(layout.nudges)
     for azimuth in np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
         x = _states(layout, unknown, np.array([azimuth]), ratio)[:, 0]
         shifts = np.concatenate([np.diag(delta), -np.diag(delta)], axis=1)
-        slopes = turbine.rhs(x[:, None] + shifts, wind, pitch=pitch)[_FREEDOMS:]
+        slopes = turbine.rhs(x[:, None] + shifts, wind, pitch=pitch)[freedoms:]
         jacobian = (slopes[:, :size] - slopes[:, size:]) / (2 * delta)
-        acc, own = jacobian[:_FREEDOMS], jacobian[_FREEDOMS:]
-        t, t1, t2 = _multiblade(azimuth, speed)
+        acc, own = jacobian[:freedoms], jacobian[freedoms:]
+        t, t1, t2 = _multiblade(layout, azimuth, speed)
         inverse = np.linalg.inv(t)
         block = np.zeros((size, size))
-        block[q, rates] = np.eye(_FREEDOMS)
+        block[q, rates] = np.eye(freedoms)
         block[rates, q] = inverse @ (acc[:, q] @ t + acc[:, rates] @ t1 - t2)
         block[rates, rates] = inverse @ (acc[:, rates] @ t - 2 * t1)
         block[rates, more] = inverse @ acc[:, more]
@@ -161,47 +208,59 @@ def linearised(turbine: Equations, wind: float, pitch: float = 0.0) -> Array:
 
 def natural_frequencies(turbine: Equations, wind: float, pitch: float) -> list[tuple[str, float, float]]:
     """See Turbine.natural_frequencies."""
-    p = turbine.parameters
+    p, layout = turbine.parameters, turbine.layout
     values, vectors = np.linalg.eig(linearised(turbine, wind, pitch))
-    flap = np.sqrt(p["b_fxfx"] + p["b_fyfy"])
+    flap, edge = np.sqrt(p["b_fxfx"] + p["b_fyfy"]), np.sqrt(p["b_exex"] + p["b_eyey"])
     tower = np.sqrt(p["t_maa"] + p["n_m"] + p["h_m"] + 3 * p["b_m"])
     rotor = np.sqrt(3 * p["b_m2"] + p["h_ixx"])
-    weight = np.array(
-        [tower, tower, np.sqrt(3) * flap, np.sqrt(1.5) * flap, np.sqrt(1.5) * flap,
-         np.sqrt(3 * (p["b_exex"] + p["b_eyey"])), rotor, np.sqrt(p["g_i"])]
-    )  # fmt: skip
+    weight: list[float] = []
+    for row in _firsts(layout):
+        name = layout.coordinates[row].position.name
+        if name in _TOWER:
+            weight.append(tower)
+        else:
+            own = flap if name.endswith("flap") else edge
+            cyclic = [np.sqrt(1.5) * own] * 2 if row in layout.blade_sets else []
+            weight += [np.sqrt(3) * own, *cyclic]
+    weights = np.array([*weight, rotor, np.sqrt(p["g_i"])])
     modes = []
     for value, vector in zip(values, vectors.T, strict=True):
         if value.imag > 2 * np.pi * 0.05:
-            share = (np.abs(vector[_FREEDOMS : 2 * _FREEDOMS]) * weight) ** 2
-            share[_ROTOR:_FREEDOMS] = share[_ROTOR:_FREEDOMS].sum() / 2
+            share = (np.abs(vector[layout.velocities]) * weights) ** 2
+            share[layout.rotor : layout.freedoms] = share[layout.rotor : layout.freedoms].sum() / 2
             modes.append((float(abs(value) / (2 * np.pi)), float(-value.real / abs(value)), share))
     modes.sort(key=lambda m: m[0])
-    return [
-        (name, f, damping) for name, (f, damping, _) in zip(_names([m[2] for m in modes]), modes, strict=True)
-    ]
+    names = _names(layout, [m[2] for m in modes])
+    return [(name, f, damping) for name, (f, damping, _) in zip(names, modes, strict=True)]
 
 
-def _names(shares: list[Array]) -> list[str]:
-    """Names by the coordinates with the largest kinetic energy; the two cyclic flap modes by their order."""
-    kinds = (
-        "tower fore-aft",
-        "tower side-side",
-        "flap collective",
-        "flap cyclic",
-        "flap cyclic",
-        "drivetrain and collective edge",
-    )
-    cyclic, drive = [_FLAP + 1, _FLAP + 2], [_EDGE, _ROTOR, _GENERATOR]
-    groups = [[_FORE_AFT], [_SIDE_SIDE], [_FLAP], cyclic, [], drive]
+def _names(layout: Layout, shares: list[Array]) -> list[str]:
+    """Names by the coordinates with the largest kinetic energy; the two cyclic modes of a blade set by their order."""
+    groups = {
+        "tower fore-aft": [layout.row("tower_fore_aft")],
+        "tower side-side": [layout.row("tower_side_side")],
+    }
+    drive = [layout.rotor, layout.generator]
+    for row in _firsts(layout):
+        name = layout.coordinates[row].position.name
+        kind = "flap" if name.endswith("flap") else "edge"
+        if name in _TOWER:
+            continue
+        if kind == "flap":
+            groups["flap collective"] = [row]
+        else:
+            drive.append(row)
+        if row in layout.blade_sets:
+            groups[f"{kind} cyclic"] = [row + 1, row + 2]
+    groups["drivetrain and collective edge"] = drive
     raw = []
     for share in shares:
-        raw.append(kinds[int(np.argmax([sum(share[i] for i in g) for g in groups]))])
+        raw.append(max(groups, key=lambda name: sum(share[i] for i in groups[name])))
     out = []
     for i, name in enumerate(raw):
         same = [j for j, other in enumerate(raw) if other == name]
-        if name == "flap cyclic":
-            name = "flap regressing" if i == same[0] else "flap progressing"
+        if name.endswith(" cyclic"):
+            name = name.replace("cyclic", "regressing" if i == same[0] else "progressing")
         elif len(same) > 1:
             name = f"{name} {same.index(i) + 1}"
         out.append(name)

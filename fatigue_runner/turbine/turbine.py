@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fatigue_runner.control import baseline
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.layout import HARMONICS, Channel, Layout
+from fatigue_runner.layout import FAMILIES, HARMONICS, Channel, Layout
 from fatigue_runner.rotor import SQUARE, Rotor
 from fatigue_runner.turbine.dynamics import BASELINE_CONTROLLED, UNCONTROLLED, Dynamics
 from fatigue_runner.turbine.file import Control, check_turbine, mapping_source, read_turbine_file
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+DEFAULT_FAMILY = "t2b1i1cg"
+
 # fixed: the pitch is held, the torque follows the momentary speed; torque-law: the controller's torque at fine pitch; controlled: both
 FIXED, TORQUE_LAW, CONTROLLED = "fixed", "torque-law", "controlled"
 OPERATIONS = (FIXED, TORQUE_LAW, CONTROLLED)
@@ -34,24 +36,22 @@ OPERATIONS = (FIXED, TORQUE_LAW, CONTROLLED)
 
 @dataclass(frozen=True, eq=False)
 class Turbine:
-    """One turbine of the type T2B1i1cG. `parameters` by `equations.PARAMETERS` [SI], at zero pitch.
+    """One turbine. `parameters` by `equations.PARAMETERS` [SI], at zero pitch.
 
+    family: `t2b1i1cg` (the blades share one edge mode) or `t2b2cg` (each has its own);
     control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it;
-    tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees;
-    sections {name: (outer diameter, wall) [m]}: circles whose wear is counted, which change no motion;
-    operating_wind: from cut-in to cut-out [m/s], None where the file does not say.
+    tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees.
     """
 
     name: str
     parameters: Mapping[str, float]
     tables: AeroTables
     description: str = ""
-    dynamics: Dynamics = UNCONTROLLED
+    dynamics: Dynamics = UNCONTROLLED[DEFAULT_FAMILY]
     control: Mapping[str, Any] | None = None
     operation: str = FIXED
     tower: tuple[tuple[float, float], ...] = ()
-    sections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    operating_wind: tuple[float, float] | None = None
+    family: str = DEFAULT_FAMILY
 
     @property
     def layout(self) -> Layout:
@@ -234,7 +234,7 @@ class Turbine:
 
 @lru_cache(maxsize=64)
 def _operated(turbine: Turbine, operation: str) -> Turbine:
-    dynamics = UNCONTROLLED if operation == FIXED else BASELINE_CONTROLLED
+    dynamics = (UNCONTROLLED if operation == FIXED else BASELINE_CONTROLLED)[turbine.family]
     return replace(turbine, operation=operation, dynamics=dynamics)
 
 
@@ -244,6 +244,8 @@ def _hash(turbine: Turbine) -> str:
     for name, value in sorted(turbine.parameters.items()):
         # nine digits: the mode integrals' last bits depend on the BLAS kernels that a processor gets
         digest.update(f"{name}={value:.8e};".encode())
+    if turbine.family != DEFAULT_FAMILY:
+        digest.update(turbine.family.encode())
     digest.update(turbine.tables.interpolation.encode())
     for values in (turbine.tables.tip_speed_ratio, turbine.tables.pitch):
         digest.update(np.ascontiguousarray(values).tobytes())
@@ -302,16 +304,21 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
         data = read_turbine_file(str(source))
     else:
         data = dict(source) if "parameters" in source else check_turbine(mapping_source(source))
-    name = str(data.get("name", "unnamed"))
+    name, description = str(data.get("name", "unnamed")), str(data.get("description", ""))
+    family = str(data.get("model", DEFAULT_FAMILY))
     if "parameters" in data:
         if "tables" not in data:
             raise InputError(f"turbine {name}: a full parameter set needs `tables` beside `parameters`")
+        if family not in FAMILIES:
+            raise InputError(f"turbine {name}: unknown model {family!r}{did_you_mean(family, FAMILIES)}")
         interpolation = str(data.get("interpolation", "cubic"))
         return Turbine(
             name,
             checked(data["parameters"]),
             tables_from_mapping(data["tables"], interpolation),
-            str(data.get("description", "")),
+            description,
+            UNCONTROLLED[family],
+            family=family,
         )
     parameters = equation_parameters(data)
     aero = data["aerodynamics"]
@@ -324,21 +331,8 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     given = data.get("control") if data["generator"]["law"] == "regions" else None
     control = Control.model_validate(given).model_dump() if given else None
     tower = tuple((float(height), float(diameter)) for height, diameter in data["tower"].get("diameters", ()))
-    sections = {
-        where: (float(circle["diameter"]), float(circle["wall"]))
-        for where, circle in (data.get("sections") or {}).items()
-        if circle
-    }
-    wind = data.get("operating_wind")
     return Turbine(
-        name,
-        parameters,
-        tables,
-        str(data.get("description", "")),
-        control=control,
-        tower=tower,
-        sections=sections,
-        operating_wind=None if wind is None else (float(wind[0]), float(wind[1])),
+        name, parameters, tables, description, UNCONTROLLED[family], control, tower=tower, family=family
     )
 
 

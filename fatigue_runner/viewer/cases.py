@@ -12,12 +12,13 @@ import numpy as np
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.source import parse_mapping
+from fatigue_runner.layout import FAMILIES, family_of
 from fatigue_runner.logbook import Log, LogError, read_log, read_metadata
 from fatigue_runner.naming import integrator_label
 from fatigue_runner.results.columns import WIND
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.viewer import colours
-from fatigue_runner.viewer.scene import DRAWN, Geometry, geometry
+from fatigue_runner.viewer.scene import Geometry, geometry
 from fatigue_runner.viewer.shapes import BladeSkin, blade_skin
 
 MAX_CASES = 4  # side by side; more turbines are too small to see
@@ -132,7 +133,8 @@ def _readable(path: Path) -> Log:
         raise InputError(
             f"{path} holds no states to show; keep topic `state` in the campaign's `log: topics`"
         )
-    if not np.isfinite(log.state[:, DRAWN]).any():
+    layout = FAMILIES[family_of([c.name for c in log.states]) or "t2b1i1cg"]
+    if not np.isfinite(log.state[:, : layout.rotor + 1]).any():
         raise InputError(
             f"{path} holds no positions to show, only {', '.join(log.loads) or 'other channels'}"
         )

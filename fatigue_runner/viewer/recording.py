@@ -15,7 +15,6 @@ import rerun as rr
 from fatigue_runner.viewer import colours, shapes, wind_scene
 from fatigue_runner.viewer.cases import Viewed
 from fatigue_runner.viewer.inflow import BLADE_WIND
-from fatigue_runner.viewer.scene import DRAWN
 from fatigue_runner.viewer.styles import SOLVER_SERIES, read_unit, set_style
 
 TIMELINE = "time"
@@ -150,7 +149,7 @@ class Stage:
 
     def _send_scene(self, case: Viewed, rows: slice) -> None:
         frames = self._frames(case, rows, FRAME_RATE, MAX_FRAMES // len(self.cases))
-        frames = frames[np.isfinite(case.log.state[frames][:, DRAWN]).all(axis=1)]
+        frames = frames[np.isfinite(case.log.state[frames][:, case.geometry.drawn]).all(axis=1)]
         if len(frames):
             self._send_turbine(case, frames)
         if len(case.log.wind):

@@ -18,17 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.errors import InputError
-from fatigue_runner.layout import BLADES, T2B1I1CG
+from fatigue_runner.layout import BLADES, FAMILIES, T2B1I1CG, Layout
 from fatigue_runner.turbine.beam import BladeModes, TowerMode, TowerModes, blade_modes, tower_modes
 
 Array = NDArray[np.float64]
 
-_FORE_AFT, _SIDE_SIDE, _EDGE = (T2B1I1CG.row(name) for name in ("tower_fore_aft", "tower_side_side", "edge"))
-_FLAPS = slice(T2B1I1CG.blade_sets[0], T2B1I1CG.blade_sets[0] + BLADES)
-AZIMUTH = T2B1I1CG.rotor
-DRAWN = slice(0, AZIMUTH + 1)  # the states that a picture needs
 _AROUND: Array = np.linspace(0.0, 2 * pi, BLADES, endpoint=False)  # the blades' places on the hub [rad]
 
 
@@ -62,6 +57,12 @@ class Geometry:
     tower_to_shaft: float
     tower_base: float
     pitch: float = 0.0
+    layout: Layout = T2B1I1CG
+
+    @property
+    def drawn(self) -> slice:
+        """The states that a picture needs."""
+        return slice(0, self.layout.rotor + 1)
 
     @property
     def radius(self) -> float:
@@ -82,12 +83,18 @@ class Geometry:
     def deflection(self, state: Array, radius: Array, scale: float = 1.0) -> Array:
         """Displacement of the blades along e1, e2, e3 (n, 3, stations, 3) [m] for states (n, rows of the layout)."""
         flap, edge = self.modes_at(radius)
-        f = scale * state[:, _FLAPS, None]
-        e = scale * state[:, _EDGE, None, None]
+        f, e = (scale * self._of_blades(state, name)[..., None] for name in ("flap", "edge"))
         across = f[..., None] * flap + e[..., None] * edge
         shortening = [np.interp(radius, self.blade.grid, column) for column in self.blade.shortening.T]
         along = -(shortening[0] * f**2 + 2 * shortening[1] * f * e + shortening[2] * e**2) / 2
         return np.concatenate([across, along[..., None]], axis=-1)
+
+    def _of_blades(self, state: Array, mode: str) -> Array:
+        """A modal coordinate of each blade (n, 3), or (n, 1) where the blades share it."""
+        if mode in self.layout.names:
+            return state[:, [self.layout.row(mode)]]
+        first = self.layout.row(f"blade1_{mode}")
+        return state[:, first : first + BLADES]
 
     def pose(self, state: Array, radius: Array, levels: int = 9, scale: float = 1.0) -> Pose:
         """Place all parts for states (n, rows of the layout); blades at the distances `radius` from the apex [m].
@@ -95,9 +102,10 @@ class Geometry:
         Raises InputError for states of another shape.
         """
         state = np.asarray(state, float)
-        if state.ndim != 2 or state.shape[1] < len(STATE_NAMES):
-            raise InputError(f"states must have shape (n, {len(STATE_NAMES)} or more), got {state.shape}")
-        a, s = scale * state[:, _FORE_AFT], scale * state[:, _SIDE_SIDE]
+        size = self.layout.size
+        if state.ndim != 2 or state.shape[1] < size:
+            raise InputError(f"states must have shape (n, {size} or more), got {state.shape}")
+        a, s = (scale * state[:, self.layout.row(name)] for name in ("tower_fore_aft", "tower_side_side"))
         tower = self._tower(a, s, np.linspace(0.0, self.tower.length, levels))
         nacelle = rotation_y(self.tower.fore_aft.top_slope * a) @ rotation_x(
             -self.tower.side_side.top_slope * s
@@ -108,7 +116,7 @@ class Geometry:
         apex = tower[:, -1] + nacelle @ arm
         # the shaft axis is (cos tilt, 0, sin tilt) in N
         shaft = nacelle @ rotation_y(np.array([-self.tilt]))
-        rotor = shaft @ rotation_x(state[:, AZIMUTH])
+        rotor = shaft @ rotation_x(state[:, self.layout.rotor])
         place = rotation_x(_AROUND) @ rotation_y(np.full(BLADES, self.cone))
         coned = rotor[:, None] @ place
         local = self.deflection(state, radius, scale)
@@ -149,6 +157,7 @@ def geometry(turbine: Mapping[str, Any], pitch: float = 0.0) -> Geometry:
             tower_to_shaft=float(g["tower_top_to_shaft"]),
             tower_base=float(g["tower_base_height"]),
             pitch=pitch,
+            layout=FAMILIES[str(turbine.get("model", "t2b1i1cg"))],
         )
     except KeyError as missing:
         raise InputError(f"turbine {turbine.get('name', '?')}: the entry {missing} is missing") from None

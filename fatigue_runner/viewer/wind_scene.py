@@ -13,7 +13,6 @@ from fatigue_runner.layout import BLADES
 from fatigue_runner.viewer import colours, shapes
 from fatigue_runner.viewer.cases import Viewed
 from fatigue_runner.viewer.inflow import SPAN, blade_wind, local_wind
-from fatigue_runner.viewer.scene import AZIMUTH
 
 ARROW_SCALE = 3.0  # m of an arrow per m/s of wind at a blade
 DISC_X = 14.0  # m, behind the nacelle: seen from upwind, the blades keep their own colours in front of it
@@ -34,7 +33,7 @@ def disc_wind(case: Viewed, rows: Any) -> np.ndarray:
 
 def wind_of_blades(case: Viewed, rows: np.ndarray) -> np.ndarray:
     """(rows, 3) wind at each blade [m/s]."""
-    return blade_wind(_signals(case, rows), case.log.state[rows, AZIMUTH])
+    return blade_wind(_signals(case, rows), case.log.state[rows, case.geometry.layout.rotor])
 
 
 def _signals(case: Viewed, rows: Any) -> np.ndarray:

@@ -22,8 +22,11 @@ def rot_y(angle):
 
 
 class IndependentModel:
-    def __init__(self, p):
+    def __init__(self, p, own_edges=False):
+        """own_edges: coordinates are then a, s, f1, f2, f3, e1, e2, e3, rotor, generator."""
         self.p = p
+        self.own_edges = own_edges
+        self.size = 10 if own_edges else 8
         self.cone = np.arctan2(p["sin_cone"], p["cos_cone"])
         self.tilt = np.arctan2(p["sin_tilt"], p["cos_tilt"])
         g = np.zeros((9, 9))
@@ -48,14 +51,14 @@ class IndependentModel:
         # the shaft points along (cos tilt, 0, sin tilt)
         shaft = nacelle @ rot_y(-self.tilt)
         apex = top + nacelle @ np.array([0, 0, p["tower_to_shaft"]]) + shaft @ np.array([p["overhang"], 0, 0])
-        return top, nacelle, apex, shaft @ rot_x(q[6])
+        return top, nacelle, apex, shaft @ rot_x(q[-2])
 
     def blade_vectors(self, q, number):
         """B_k (9, 3) of one blade."""
         _, _, apex, rotor = self.frames(q)
         axes = rotor @ rot_x(2 * np.pi / 3 * (number - 1)) @ rot_y(self.cone)
         n1, n2, n3 = axes[:, 0], axes[:, 1], axes[:, 2]
-        f, e = q[1 + number], q[5]
+        f, e = q[1 + number], q[4 + number if self.own_edges else 5]
         return np.array(
             [apex, n3, f * n1, f * n2, e * n1, e * n2, -(f**2) / 2 * n3, -f * e * n3, -(e**2) / 2 * n3]
         )
@@ -78,14 +81,14 @@ class IndependentModel:
             arrays.append(axes.T)
             grams.append(np.diag(sum(inertia) / 2 - np.array(inertia)))
         zero = 0 * q[0]
-        arrays.append(np.array([[q[0], zero, zero], [zero, q[1], zero], [q[7], zero, zero]]))
+        arrays.append(np.array([[q[0], zero, zero], [zero, q[1], zero], [q[-1], zero, zero]]))
         grams.append(np.diag([p["t_maa"], p["t_mss"], p["g_i"]]))
         return arrays, grams
 
     def jacobians(self, q):
-        """dB/dq: list of (8, k, 3)."""
+        """dB/dq: list of (size, k, 3)."""
         h = 1e-30
-        columns = [self.points(q + 1j * h * np.eye(8)[i])[0] for i in range(8)]
+        columns = [self.points(q + 1j * h * np.eye(self.size)[i])[0] for i in range(self.size)]
         return [np.array([c[b].imag / h for c in columns]) for b in range(len(columns[0]))]
 
     def mass_matrix(self, q):
@@ -101,20 +104,23 @@ class IndependentModel:
         weight = sum(g * (self.gram[0] @ arrays[i][:, 2]) for i in range(3))
         weight += g * (p["n_m"] * arrays[3][0, 2] + p["h_m"] * arrays[4][0, 2])
         weight -= g * (p["t_gfa"] * q[0] ** 2 + p["t_gss"] * q[1] ** 2) / 2
-        spring = p["t_ka"] * q[0] ** 2 + p["t_ks"] * q[1] ** 2 + 3 * p["b_ke"] * q[5] ** 2
-        spring += sum(p["b_kf"] * f**2 + 2 * p["b_kfe"] * f * q[5] for f in q[2:5])
-        return weight + (spring + p["d_k"] * (q[6] - q[7] / p["g_ratio"]) ** 2) / 2
+        spring = p["t_ka"] * q[0] ** 2 + p["t_ks"] * q[1] ** 2
+        edges = q[5:8] if self.own_edges else [q[5]] * 3
+        for f, e in zip(q[2:5], edges, strict=True):
+            spring += p["b_kf"] * f**2 + 2 * p["b_kfe"] * f * e + p["b_ke"] * e**2
+        return weight + (spring + p["d_k"] * (q[-2] - q[-1] / p["g_ratio"]) ** 2) / 2
 
     def energy(self, x):
-        """Kinetic plus potential energy [J] of a state (16,)."""
-        q, v = x[:8], x[8:]
+        """Kinetic plus potential energy [J] of a state."""
+        q, v = x[: self.size], x[self.size :]
         return v @ self.mass_matrix(q) @ v / 2 + self.potential(q)
 
     def accelerations(self, x):
         """q'' of the free, undamped turbine."""
-        q, v = x[:8], x[8:]
+        q, v = x[: self.size], x[self.size :]
         h = 1e-30
-        gradient = np.array([self.potential(q + 1j * h * np.eye(8)[i]).imag / h for i in range(8)])
+        nudges = 1j * h * np.eye(self.size)
+        gradient = np.array([self.potential(q + nudge).imag / h for nudge in nudges])
         # B'' at q'' = 0 by central differences of the complex-step velocity along the motion
         d = 1e-4
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from viewer_example import shape
 
+from fatigue_runner.layout import T2B1I1CG
 from fatigue_runner.viewer.inflow import SPAN, blade_wind, local_wind
-from fatigue_runner.viewer.scene import AZIMUTH
 from fatigue_runner.wind.azimuth import wind_at
 
 
@@ -46,10 +46,10 @@ def test_a_blade_feels_the_colour_of_the_disc_that_it_passes(harmonics):
     """Signs and sense of rotation of the drawn turbine and of the disc are one."""
     geometry, wind = shape("t2b1i1cg"), signals(harmonics)
     state = np.zeros((len(wind), 16))
-    state[:, AZIMUTH] = np.linspace(0.0, 5.0, len(wind))
+    state[:, T2B1I1CG.rotor] = np.linspace(0.0, 5.0, len(wind))
     pose = geometry.pose(state, np.array([SPAN * geometry.radius]))
     blades = pose.blades[:, :, 0] - pose.apex[:, None]
     for row in range(len(wind)):
         y, z = blades[row, :, 1], blades[row, :, 2]
         shown = local_wind(wind[row : row + 1], y, z, geometry.radius)[0]
-        assert shown == pytest.approx(blade_wind(wind, state[:, AZIMUTH])[row])
+        assert shown == pytest.approx(blade_wind(wind, state[:, T2B1I1CG.rotor])[row])

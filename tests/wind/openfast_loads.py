@@ -69,14 +69,18 @@ def steady(speed: float) -> Trajectory:
 
 
 @lru_cache(maxsize=16)
-def in_field(speed: float, harmonics: int, operation: str = CONTROLLED) -> Trajectory:
-    """A run in OpenFAST's own field."""
+def in_field(
+    speed: float, harmonics: int, operation: str = CONTROLLED, machine: Turbine | None = None
+) -> Trajectory:
+    """A run in OpenFAST's own field; machine: another turbine than `turbine(operation)`."""
     wind = FullFieldWind(DATA / f"ntmB_U{speed:02.0f}_s1.bts", harmonics=harmonics)
-    return run(wind, speed, END, operation)
+    return run(wind, speed, END, operation, machine)
 
 
-def run(wind: WindSource, speed: float, duration: float, operation: str) -> Trajectory:
-    machine = turbine(operation)
+def run(
+    wind: WindSource, speed: float, duration: float, operation: str, machine: Turbine | None = None
+) -> Trajectory:
+    machine = machine or turbine(operation)
     start = machine.operating_point(speed, 0.14)[None]
     return simulate(Ensemble(machine, [wind], start, duration, 0.05), Integrator("rk4", 0.025))[0]
 
@@ -100,10 +104,12 @@ def steady_equivalents(speed: float) -> Iterator[Pair]:
     yield from _equivalents(steady(speed), SETTLED, COUNTED, rows("shear_del.csv", wind_mps=f"{speed:g}"))
 
 
-def field_equivalents(speed: float, harmonics: int, operation: str = CONTROLLED) -> Iterator[Pair]:
+def field_equivalents(
+    speed: float, harmonics: int, operation: str = CONTROLLED, machine: Turbine | None = None
+) -> Iterator[Pair]:
     """Damage-equivalent loads in a field."""
     table = rows("turb_del.csv", case=f"turb_U{speed:04.1f}_s1", config="qs")
-    yield from _equivalents(in_field(speed, harmonics, operation), BEGIN, END - BEGIN, table)
+    yield from _equivalents(in_field(speed, harmonics, operation, machine), BEGIN, END - BEGIN, table)
 
 
 def _equivalents(

@@ -18,7 +18,7 @@ from fatigue_runner.benchmark.study.cases import Cases
 from fatigue_runner.benchmark.study.integrators import ADAPTIVE
 from fatigue_runner.benchmark.study.points import Point, Reference, evaluate
 from fatigue_runner.integrators import Integrator, simulate
-from fatigue_runner.layout import T2B1I1CG, Channel
+from fatigue_runner.layout import Channel
 
 METHODS = ("dop853-adaptive", "tsit5-adaptive")
 # Absolute tolerance of a state as a fraction of its range: the states differ by four orders of magnitude.
@@ -77,7 +77,7 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
     times = np.arange(round(duration / cases.output_step) + 1) * cases.output_step
     f = right_hand_side.of_one_case(turbine, wind, duration, cases.pitch)
     scale = ranges(cases, number)
-    q_rows, v_rows = T2B1I1CG.positions, T2B1I1CG.velocities
+    q_rows, v_rows = turbine.layout.positions, turbine.layout.velocities
     begin = time.perf_counter()
     stepper = solver(name)(f, 0.0, initial, duration, rtol=tolerance, atol=ABSOLUTE * tolerance * scale)
     states, filled = np.empty((len(times), len(initial))), 1

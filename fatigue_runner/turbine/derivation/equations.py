@@ -1,7 +1,7 @@
-"""Equations of motion of the T2B1i1cG turbine, derived symbolically; `tools/generate_kernel.py` prints them as code.
+"""Equations of motion of the turbines T2B1i1cG and T2B2cG, derived symbolically; `tools/generate_kernel.py` prints them as code.
 
-Degrees of freedom q: tower fore-aft a, tower side-side s, flap of blades 1-3 f1 f2 f3, collective edge e, rotor azimuth,
-generator azimuth (high-speed side). Method: D'Alembert's principle on the positions of all mass elements,
+Degrees of freedom q: tower fore-aft a, tower side-side s, flap of blades 1-3 f1 f2 f3, edge (one collective e, or e1 e2 e3 of each
+blade: `States`), rotor azimuth, generator azimuth (high-speed side). Method: D'Alembert's principle on the positions of all mass elements,
     sum over bodies of  integral (dp/dq_j) . (p'' - g) dm  =  Q_j ,
 with the rotor as one flexible body in the rotating hub frame F (floating-frame formulation, e.g. Shabana, Dynamics of
 Multibody Systems, ch. 5). Nothing is linearised, except that products of the blades' axial foreshortening with another
@@ -117,8 +117,43 @@ PARAMETERS = {
 }
 P = {name: sp.Symbol(name, real=True) for name in PARAMETERS}
 
-STATE = sp.symbols("a s f1 f2 f3 e phi gen ad sd f1d f2d f3d ed phid gend", real=True)
-ACCELERATION = sp.symbols("add sdd f1dd f2dd f3dd edd phidd gendd", real=True)
+
+@dataclass(frozen=True)
+class States:
+    """Symbols of the coordinates, their rates (`..d`) and accelerations (`..dd`), by the edge coordinates: one, or one of each blade."""
+
+    edges: tuple[str, ...]
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        return ("a", "s", "f1", "f2", "f3", *self.edges, "phi", "gen")
+
+    def symbols(self, order: int) -> tuple[sp.Symbol, ...]:
+        """The coordinates' derivatives of an order."""
+        return tuple(sp.Symbol(name + "d" * order, real=True) for name in self.coordinates)
+
+    @property
+    def all(self) -> tuple[sp.Symbol, ...]:
+        """Coordinates, then rates, as in the layout."""
+        return (*self.symbols(0), *self.symbols(1))
+
+    def of(self, name: str, order: int = 0) -> sp.Symbol:
+        return self.symbols(order)[self.coordinates.index(name)]
+
+    def flap(self, number: int, order: int = 0) -> sp.Symbol:
+        return self.of(f"f{number}", order)
+
+    def edge(self, number: int, order: int = 0) -> sp.Symbol:
+        """Of blade 1, 2 or 3."""
+        return self.of(self.edges[number - 1 if self.own_edges else 0], order)
+
+    @property
+    def own_edges(self) -> bool:
+        """Whether each blade has an edge coordinate of its own."""
+        return len(self.edges) > 1
+
+
+T2B1I1CG, T2B2CG = States(("e",)), States(("e1", "e2", "e3"))
 WIND = sp.symbols("v kv kh", real=True)
 # what the wind's azimuthal harmonics add at the blades, uniform along them: mean + cos cos(alpha_i) + sin sin(alpha_i)
 FOLDED = sp.symbols("w_fold_mean w_fold_cos w_fold_sin", real=True)
@@ -141,6 +176,17 @@ UNIFORM_TABLES = ("thrust_w", "flap_w", "torque_w", "edge_w", "tangential_w", "b
 _OWN = 29  # tables without which the equations do not do
 HARMONIC_TABLES = (*TABLES[:_OWN], *UNIFORM_TABLES, *TABLES[_OWN:])
 HARMONIC_TABLES_OF_THE_EQUATIONS = _OWN + len(UNIFORM_TABLES)
+_LOADS_ONLY = ("tangential", "bending")  # what blades with an edge of their own read for their loads only
+
+
+def tables(states: States, harmonics: bool) -> tuple[tuple[str, ...], int]:
+    """Names of the coefficients, those of the equations first; and how many these are (whole vectors of 8 where others follow)."""
+    names = HARMONIC_TABLES if harmonics else TABLES
+    if states.own_edges:
+        first = tuple(name for name in names if name not in _LOADS_ONLY)
+        return (*first, *_LOADS_ONLY), len(first)
+    return names, HARMONIC_TABLES_OF_THE_EQUATIONS if harmonics else TABLES_OF_THE_EQUATIONS
+
 
 HALF_SQRT3 = sp.Symbol(
     "half_sqrt3", real=True
@@ -159,6 +205,7 @@ BLADE_AZIMUTH = (
 class Sheet:
     """Straight-line assignments: `constants` depend on parameters only, `lines` on the state as well."""
 
+    states: States = T2B1I1CG
     constants: dict[sp.Symbol, sp.Expr] = field(default_factory=dict)
     lines: list[tuple[sp.Symbol, sp.Expr]] = field(default_factory=list)
     _known: dict[sp.Expr, sp.Symbol] = field(default_factory=dict)
@@ -185,10 +232,11 @@ class Sheet:
         flat = sp.Add(
             *(self.constant(c) * sp.prod(x**k for x, k in zip(variables, ks, strict=True)) for ks, c in terms)
         )
-        for edge in (STATE[13], STATE[5]):
-            flat = sp.collect(
-                flat, edge, lambda part, e=STATE[5]: sp.horner(part, wrt=e) if part.has(e) else part
-            )
+        if self.states.own_edges:
+            return flat
+        e, ed = self.states.edge(1), self.states.edge(1, 1)
+        for edge in (ed, e):
+            flat = sp.collect(flat, edge, lambda part: sp.horner(part, wrt=e) if part.has(e) else part)
         return flat
 
     def linear(self, expr: sp.Expr, variables) -> sp.Expr:
@@ -287,6 +335,11 @@ class Blade:
     fd: sp.Expr
     ed: sp.Expr
 
+    def own(self, sheet: Sheet) -> dict[str, sp.Expr]:
+        """What differs from blade to blade, by its letter in products: f, its rate d, and e, its rate g unless the blades share it."""
+        flap = {"f": self.f, "d": self.fd}
+        return flap | {"e": self.e, "g": self.ed} if sheet.states.own_edges else flap
+
     def foreshortening(self, kind: str) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
         return P[f"b_{kind}ff"], P[f"b_{kind}fe"], P[f"b_{kind}ee"]
 
@@ -358,16 +411,29 @@ def at_blades(sheet: Sheet, name: str, harmonics) -> list[sp.Expr]:
     return [sheet.let(f"{name}_{i + 1}", x) for i, x in enumerate(values)]
 
 
+# products of a blade's own f, fd (d), e, ed (g) in terms of what `harmonic_sums` sums up
+_HALF = sp.Rational(1, 2)
+_PRODUCTS = {
+    **{name: ((name, sp.Integer(1)),) for name in ("f", "d", "e", "g", "ff", "ef", "ee", "dd", "dg", "gg")},
+    "df": (("fd", _HALF),),
+    "eg": (("eg", _HALF),),
+    "fg": (("ef_rate", _HALF), ("turn", -_HALF)),
+    "de": (("ef_rate", _HALF), ("turn", _HALF)),
+}
+
+
 def rotor_sum(sheet: Sheet, expr: sp.Expr, blade: Blade) -> sp.Expr:
-    """Sum over the three blades of a polynomial in a generic blade's f, fd and AZIMUTH."""
+    """Sum over the three blades of a polynomial in a generic blade's own deflections, their rates and AZIMUTH."""
     total = sp.Integer(0)
-    for (kf, kfd), coefficient in sp.Poly(sp.expand(expr), blade.f, blade.fd).terms():
+    letters = blade.own(sheet)
+    for powers, coefficient in sp.Poly(sp.expand(expr), *letters.values()).terms():
         mean, cosine, sine = over_azimuth(coefficient)
-        if kf == kfd == 0:
+        name = "".join(sorted("".join(letter * k for letter, k in zip(letters, powers, strict=True))))
+        if not name:
             total += 3 * mean
-        else:
-            own = harmonic_symbols("f" * kf + "d" * kfd)
-            scale = sp.Rational(1, 2) if kf == kfd == 1 else 1
+            continue
+        for product, scale in _PRODUCTS[name]:
+            own = harmonic_symbols(product)
             total += scale * (3 * mean * own[0] + sp.Rational(3, 2) * (cosine * own[1] + sine * own[2]))
     return sheet.collect(total)
 
@@ -376,17 +442,35 @@ def harmonic_symbols(name: str) -> list[sp.Symbol]:
     return [sp.Symbol(f"{name}_{weight}", real=True) for weight in ("mean", "cos", "sin")]
 
 
-def harmonic_sums(sheet: Sheet, names=("f", "d", "ff", "fd", "dd")) -> None:
-    """Mean, cosine and sine part over the rotor of the flaps, their rates and products: x_i = mean + cos cos_i + sin sin_i."""
-    f, fd = STATE[2:5], STATE[10:13]
+def harmonic_sums(sheet: Sheet, rates_only: bool = False) -> None:
+    """Mean, cosine and sine part over the rotor of the blades' own deflections, rates and products: x_i = mean + cos cos_i + sin sin_i."""
+    x = sheet.states
+    f, fd, e, ed = ([of(i, k) for i in (1, 2, 3)] for of in (x.flap, x.edge) for k in (0, 1))
+
+    def times(a, b, scale=1):
+        return [scale * p * q for p, q in zip(a, b, strict=True)]
+
     products = {
         "f": f,
         "d": fd,
-        "ff": [x * x for x in f],
-        "fd": [2 * x * y for x, y in zip(f, fd, strict=True)],  # the rate of ff
-        "dd": [y * y for y in fd],
+        "ff": times(f, f),
+        "fd": times(f, fd, 2),  # the rate of ff
+        "dd": times(fd, fd),
     }
-    for name in names:
+    if x.own_edges:
+        both = list(zip(times(f, ed), times(e, fd), strict=True))
+        products |= {
+            "e": e,
+            "g": ed,
+            "ef": times(e, f),
+            "ee": times(e, e),
+            "ef_rate": [a + b for a, b in both],
+            "eg": times(e, ed, 2),  # the rate of ee
+            "turn": [b - a for a, b in both],
+            "dg": times(fd, ed),
+            "gg": times(ed, ed),
+        }
+    for name in [n for n in products if n in "dg"] if rates_only else products:
         one, two, three = (sheet.let(f"{name}_of_{i + 1}", x) for i, x in enumerate(products[name]))
         mean, cosine, sine = harmonic_symbols(name)
         sheet.lines.append((mean, (one + (two + three)) / 3))
@@ -456,7 +540,7 @@ def sum_tensor(sheet: Sheet, j: sp.Matrix, blade: Blade) -> Tensor:
 
 def with_edge_slope(sheet: Sheet, name: str, expr: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
     """A quadratic polynomial in e, and its derivative by e, sharing their parts."""
-    e = STATE[5]
+    e = sheet.states.edge(1)
     square, linear, fixed = (sp.expand(expr).coeff(e, k) for k in (2, 1, 0))
     slope = sheet.let(f"{name}_slope", linear + square * e)
     return sheet.let(name, fixed + e * slope), sheet.let(f"{name}_by_e", slope + square * e)
@@ -478,10 +562,15 @@ class Motion:
     spin: sp.Matrix
 
 
+def tower(sheet: Sheet, order: int = 0) -> tuple[sp.Symbol, sp.Symbol]:
+    """The tower top's fore-aft and side-side coordinate, or their derivatives."""
+    return sheet.states.of("a", order), sheet.states.of("s", order)
+
+
 def tower_top(sheet: Sheet) -> Motion:
     """Motion of the tower top, components in N."""
-    a, s = STATE[0:2]
-    ad, sd = STATE[8:10]
+    a, s = tower(sheet)
+    ad, sd = tower(sheet, 1)
     mu_a, mu_s = P["t_slope_fa"], P["t_slope_ss"]
     sin_a, cos_a = sin_cos_small(sheet, "pitch", mu_a * a)
     sin_r, cos_r = sin_cos_small(sheet, "roll", -mu_s * s)
@@ -539,7 +628,7 @@ def to_shaft(sheet: Sheet, name: str, v) -> sp.Matrix:
 def hub(sheet: Sheet, top: Motion) -> Motion:
     """Motion of the rotor apex and of frame F, components in F."""
     apex = offset(sheet, "apex", top, apex_arm(sheet))
-    phid = STATE[14]
+    phid = sheet.states.of("phi", 1)
 
     def to_f(name, v):
         return sheet.let_vector(name, rot_x_t(COSINE, SINE, to_shaft(sheet, f"{name}_s", v)))
@@ -566,11 +655,18 @@ class RotorInertia:
     mass: sp.Expr
     first: sp.Matrix
     inertia: sp.Matrix
-    edge_linear: sp.Matrix  # integral du/de dm, summed
-    edge_angular: sp.Matrix
     force: sp.Matrix  # integral (a - g) dm at zero q''
     moment: sp.Matrix  # integral rho x (a - g) dm about the apex
-    edge: sp.Expr  # integral du/de . (a - g) dm, summed
+    edge: CollectiveEdge | None  # where the blades share one
+
+
+@dataclass
+class CollectiveEdge:
+    """What the blades' edgewise deflection meets when they share it, summed over them."""
+
+    linear: sp.Matrix  # integral du/de dm
+    angular: sp.Matrix
+    force: sp.Expr  # integral du/de . (a - g) dm at zero q''
 
 
 def inertia_of(j: sp.Matrix) -> sp.Matrix:
@@ -585,12 +681,13 @@ def let_symmetric(sheet: Sheet, name: str, m: sp.Matrix) -> sp.Matrix:
     return out
 
 
-def blade_symbols(number: int | None) -> Blade:
+def blade_symbols(sheet: Sheet, number: int | None = None) -> Blade:
     """Blade 1, 2 or 3; None: a generic blade for sums over the rotor."""
-    e, ed = STATE[5], STATE[13]
-    if number is None:
-        return Blade(sp.Symbol("f", real=True), e, sp.Symbol("fd", real=True), ed)
-    return Blade(STATE[1 + number], e, STATE[9 + number], ed)
+    x = sheet.states
+    if number is not None:
+        return Blade(x.flap(number), x.edge(number), x.flap(number, 1), x.edge(number, 1))
+    f, fd, e, ed = (sp.Symbol(name, real=True) for name in ("f", "fd", "e", "ed"))
+    return Blade(f, e, fd, ed)
 
 
 def body_force(sheet, name, m, mass, first, first_rate, first_rate2, inertia, turning, spin_moment):
@@ -609,8 +706,28 @@ def body_force(sheet, name, m, mass, first, first_rate, first_rate2, inertia, tu
 def rotor(sheet: Sheet, m: Motion) -> RotorInertia:
     """Hub and three blades as one body in frame F."""
     harmonic_sums(sheet)
-    b = blade_symbols(None)
-    ed, w = b.ed, m.omega
+    b, w = blade_symbols(sheet), m.omega
+    own = inertia_of(b.second_moment())
+    mass = 3 * P["b_m"] + P["h_m"]
+    hub_tensor = sp.diag(P["h_ixx"], P["h_itt"], P["h_itt"])
+    if sheet.states.own_edges:
+        first = sheet.let_vector("rs", sum_vector(sheet, b.first_moment(), b))
+        first_rate = sheet.let_vector("rsd", sum_vector(sheet, b.rate(b.first_moment()), b))
+        first_rate2 = sheet.let_vector("rsdd", sum_vector(sheet, b.first_moment_rate2(), b))
+        spin_moment = sheet.let_vector(
+            "rl", sum_vector(sheet, b.angular("f") * b.fd + b.angular("e") * b.ed, b)
+        )
+        whole = sum_tensor(sheet, own, b).map(lambda n, x: sheet.let(f"ri_{n}", x))
+        inertia = let_symmetric(sheet, "rih", whole.matrix(sheet, "ri") + hub_tensor)
+        rate = sum_tensor(sheet, b.rate(own), b).map(lambda n, x: sheet.let(f"rid_{n}", x))
+        turning = sheet.let_vector("turning", rate.matrix(sheet, "rid") * w)
+        mass = sheet.constant(mass)
+        force, moment = body_force(
+            sheet, "rot", m, mass, first, first_rate, first_rate2, inertia, turning, spin_moment
+        )
+        return RotorInertia(mass, first, inertia, force, moment, None)
+
+    ed = b.ed
     first, edge_linear = (sp.Matrix(x) for x in zip(*(
         with_edge_slope(sheet, f"rs_{n}", x) for n, x in zip("xyz", sum_vector(sheet, b.first_moment(), b), strict=True)
     ), strict=True))  # fmt: skip
@@ -620,15 +737,13 @@ def rotor(sheet: Sheet, m: Motion) -> RotorInertia:
     edge_angular = sheet.let_vector("rle", sum_vector(sheet, b.angular("e"), b))
     spin_moment = sheet.let_vector("rl", edge_angular * ed + sum_vector(sheet, b.angular("f") * b.fd, b))
 
-    own = inertia_of(b.second_moment())
     pairs = sum_tensor(sheet, own, b).map(lambda n, x: with_edge_slope(sheet, f"ri_{n}", x))
-    hub_tensor = sp.diag(P["h_ixx"], P["h_itt"], P["h_itt"])
     inertia = let_symmetric(sheet, "rih", pairs.map(lambda _, pair: pair[0]).matrix(sheet, "ri") + hub_tensor)
     by_edge = pairs.map(lambda _, pair: pair[1])
     by_flap = sum_tensor(sheet, sp.diff(own, b.f) * b.fd, b)
     rate = by_flap.map(lambda n, x: sheet.let(f"rid_{n}", x + getattr(by_edge, n) * ed))
     turning = sheet.let_vector("turning", rate.matrix(sheet, "rid") * w)
-    mass = sheet.constant(3 * P["b_m"] + P["h_m"])
+    mass = sheet.constant(mass)
     force, moment = body_force(
         sheet, "rot", m, mass, first, first_rate, first_rate2, inertia, turning, spin_moment
     )
@@ -637,42 +752,55 @@ def rotor(sheet: Sheet, m: Motion) -> RotorInertia:
     centrifugal = by_edge.quadratic(sheet, w) / 2
     edge = edge_linear.dot(m.acceleration) + edge_angular.dot(m.spin) - centrifugal - along
     return RotorInertia(
-        mass, first, inertia, edge_linear, edge_angular, force, moment, sheet.let("h_edge", edge)
+        mass,
+        first,
+        inertia,
+        force,
+        moment,
+        CollectiveEdge(edge_linear, edge_angular, sheet.let("h_edge", edge)),
     )
 
 
 @dataclass
-class Flapwise:
-    """A quantity of each blade: what is the same for any flap plus the flap times the rest, both by harmonics."""
+class Bladewise:
+    """A quantity of each blade by harmonics over its place: `parts[""]` is the same for any deflection, `parts["f"]` goes with the
+    blade's own flap and, where it has one, `parts["e"]` with its own edge."""
 
-    fixed: list[sp.Expr]
-    by_flap: list[sp.Expr]
+    parts: dict[str, list[sp.Expr]]
 
     @classmethod
-    def of(cls, sheet: Sheet, expr: sp.Expr, variables) -> Flapwise:
-        """A polynomial in a generic blade's f (linear) and AZIMUTH, and linear in `variables`."""
-        f = blade_symbols(None).f
-        parts = (
-            [sheet.linear(x, variables) for x in over_azimuth(sp.expand(expr).coeff(f, k))] for k in (0, 1)
-        )
-        return cls(*parts)
+    def of(cls, sheet: Sheet, expr: sp.Expr, variables) -> Bladewise:
+        """A polynomial in AZIMUTH, linear in a generic blade's own deflections, and linear in `variables`."""
+        deflections = {k: x for k, x in blade_symbols(sheet).own(sheet).items() if k in "fe"}
+        rest, found = sp.expand(expr), {}
+        for letter, x in deflections.items():
+            found[letter], rest = rest.coeff(x, 1), rest.coeff(x, 0)
+        parts = {"": rest} | found
+        return cls({k: [sheet.linear(x, variables) for x in over_azimuth(part)] for k, part in parts.items()})
 
     def at_blades(self, sheet: Sheet, name: str) -> list[sp.Expr]:
-        fixed, by_flap = (at_blades(sheet, f"{name}_{n}", x) for n, x in vars(self).items())
-        return [x + STATE[2 + i] * y for i, (x, y) in enumerate(zip(fixed, by_flap, strict=True))]
+        names = {"": "fixed", "f": "by_flap", "e": "by_edge"}
+        at = {k: at_blades(sheet, f"{name}_{names[k]}", part) for k, part in self.parts.items()}
+        x = sheet.states
+        own = {"f": [x.flap(i) for i in (1, 2, 3)], "e": [x.edge(i) for i in (1, 2, 3)]}
+        return [at[""][i] + sum(own[k][i] * at[k][i] for k in at if k) for i in range(3)]
 
 
-def flap_coupling(sheet: Sheet, t, w) -> Flapwise:
-    """integral du/df . (t + w x rho) dm of each blade: t, w in F."""
-    b = blade_symbols(None)
-    linear, angular = to_hub(sp.diff(b.first_moment(), b.f)), to_hub(b.angular("f"))
-    return Flapwise.of(sheet, linear.dot(t) + angular.dot(w), [*t, *w])
+def mode_of(blade: Blade, mode: str) -> sp.Expr:
+    return {"f": blade.f, "e": blade.e}[mode]
 
 
-def flap_whirl(sheet: Sheet, w) -> Flapwise:
-    """integral du/df . (w x (w x rho) + 2 w x du/dt) dm of each blade."""
-    b = blade_symbols(None)
-    own = inertia_of(sp.diff(b.second_moment(), b.f))
+def coupling(sheet: Sheet, mode: str, t, w) -> Bladewise:
+    """integral du/d(mode) . (t + w x rho) dm of each blade: t, w in F."""
+    b = blade_symbols(sheet)
+    linear, angular = to_hub(sp.diff(b.first_moment(), mode_of(b, mode))), to_hub(b.angular(mode))
+    return Bladewise.of(sheet, linear.dot(t) + angular.dot(w), [*t, *w])
+
+
+def centrifugal(sheet: Sheet, mode: str, w) -> tuple[sp.Expr, list[sp.Expr]]:
+    """integral du/d(mode) . (w x (w x rho)) dm of each blade, and the products of w that it is linear in."""
+    b = blade_symbols(sheet)
+    own = inertia_of(sp.diff(b.second_moment(), mode_of(b, mode)))
     c, s = AZIMUTH
     turn = sp.Matrix([[1, 0, 0], [0, c, -s], [0, s, c]])
     tensor = turn * cone_tensor(own) * turn.T
@@ -680,10 +808,17 @@ def flap_whirl(sheet: Sheet, w) -> Flapwise:
     whole = sp.Matrix(
         [[p.xx, p.xy, p.xz], [p.xy, p.mean + p.difference, p.yz], [p.xz, p.yz, p.mean - p.difference]]
     )
-    centrifugal = -sum(tensor[i, j] * whole[i, j] for i in range(3) for j in range(3)) / 2
+    total = -sum(tensor[i, j] * whole[i, j] for i in range(3) for j in range(3)) / 2
+    return sp.expand(total), list(vars(p).values())
+
+
+def flap_whirl(sheet: Sheet, w) -> Bladewise:
+    """integral du/df . (w x (w x rho) + 2 w x du/dt) dm of each blade that shares its edge with the others."""
+    b = blade_symbols(sheet)
+    outwards, variables = centrifugal(sheet, "f", w)
     twice = [sheet.let(f"w_ed_{n}", x * b.ed) for n, x in zip("xyz", w, strict=True)]
     coriolis = 2 * b.coriolis() * to_hub([0, 0, 1]).dot(twice)
-    return Flapwise.of(sheet, sp.expand(centrifugal) + coriolis, [*vars(p).values(), *twice])
+    return Bladewise.of(sheet, outwards + coriolis, [*variables, *twice])
 
 
 def az_frame(sheet: Sheet, name: str, v, number: int) -> sp.Matrix:
@@ -712,6 +847,7 @@ class Aerodynamics:
     inplane: tuple[sp.Expr, sp.Expr]  # V y_i
     skew: tuple[sp.Expr, sp.Expr]  # in-plane wind along the blade, outwards
     pressure: sp.Expr  # rho A V / 6: a blade's third of rho/2 A V
+    states: States
     uniform: tuple[
         sp.Expr, ...
     ] = ()  # mean, cos and sin part of the wind that the harmonics add along the shaft; or nothing
@@ -725,8 +861,8 @@ class Aerodynamics:
         if self.uniform:
             mean, uc, us = self.uniform
             total += TABLE[f"{name}_w"] * (mean + uc * c + us * s)
-        flap = TABLE[f"{name}_flap"] * STATE[9 + number]
-        return total + flap + (TABLE[f"{name}_edge"] * STATE[13] if f"{name}_edge" in TABLE else 0)
+        flap = TABLE[f"{name}_flap"] * self.states.flap(number, 1)
+        return total + flap + TABLE[f"{name}_edge"] * self.states.edge(number, 1)
 
     def parts(self) -> list[tuple[str, tuple[sp.Expr, ...]]]:
         """(table's suffix, cos and sin part) of everything periodic."""
@@ -739,23 +875,32 @@ class Aerodynamics:
         """What part i of the harmonics' wind makes of a load."""
         return TABLE[f"{name}_w"] * self.uniform[i] if self.uniform else sp.Integer(0)
 
-    def flapwise(self) -> list[sp.Expr]:
-        """The generalised flap force of a blade that does not flap, by harmonics; times `pressure`."""
-        mean = TABLE["flap"] * self.normal + TABLE["flap_edge"] * STATE[13] + self.of_uniform("flap", 0)
+    def of_shared_edge(self, name: str) -> sp.Expr:
+        """What the edgewise velocity that all blades share makes of a load."""
+        return sp.Integer(0) if self.states.own_edges else TABLE[f"{name}_edge"] * self.states.edge(1, 1)
+
+    def resting(self, name: str) -> list[sp.Expr]:
+        """The generalised flap or edge force of a blade that does not deflect by itself, by harmonics; times `pressure`."""
+        mean = TABLE[name] * self.normal + self.of_shared_edge(name) + self.of_uniform(name, 0)
         parts = self.parts()
-        return [mean, *(sum(TABLE[f"flap_{key}"] * part[i] for key, part in parts) for i in (0, 1))]
+        return [mean, *(sum(TABLE[f"{name}_{key}"] * part[i] for key, part in parts) for i in (0, 1))]
+
+    def of_rates(self, name: str, i: int) -> sp.Expr:
+        """What part i (mean, cos, sin) of the blades' own modal velocities makes of a load."""
+        total = TABLE[f"{name}_flap"] * harmonic_symbols("d")[i]
+        return total + TABLE[f"{name}_edge"] * harmonic_symbols("g")[i] if self.states.own_edges else total
 
     def mean(self, name: str) -> sp.Expr:
         """A third of the sum over the blades."""
-        flap = TABLE[f"{name}_flap"] * harmonic_symbols("d")[0] + self.of_uniform(name, 0)
-        return TABLE[name] * self.normal + TABLE[f"{name}_edge"] * STATE[13] + flap
+        own = self.of_rates(name, 0) + self.of_uniform(name, 0)
+        return TABLE[name] * self.normal + self.of_shared_edge(name) + own
 
     def harmonic(self, name: str) -> tuple[sp.Expr, sp.Expr]:
         """Two thirds of the sums weighted with cos and sin of the blade's place; what all blades share drops out."""
         out = []
-        for i, rate in enumerate(harmonic_symbols("d")[1:]):
+        for i in (0, 1):
             periodic = sum(TABLE[f"{name}_{key}"] * part[i] for key, part in self.parts())
-            out.append(periodic + TABLE[f"{name}_flap"] * rate)
+            out.append(periodic + self.of_rates(name, i + 1))
         return out[0], out[1]
 
 
@@ -765,7 +910,7 @@ def inflow(sheet: Sheet, m: Motion, harmonics: bool) -> Aerodynamics:
     Of the harmonics' wind, the part along the shaft acts on the blades; across the rotor it would be a few per cent of a fluctuation.
     """
     v, kv, kh = WIND
-    ad, sd = STATE[8:10]
+    ad, sd = tower(sheet, 1)
     cos_a, sin_a, cos_r, sin_r = sp.symbols("pitch_cos pitch_sin roll_cos roll_sin", real=True)
     wind_n = rot_x_t(cos_r, sin_r, rot_y_t(cos_a, sin_a, [v, 0, 0]))
     wind_s = to_shaft(sheet, "wind_s", sheet.let_vector("wind_n", wind_n))
@@ -782,7 +927,7 @@ def inflow(sheet: Sheet, m: Motion, harmonics: bool) -> Aerodynamics:
     skew = tuple(sheet.let(f"skew_{n}", x) for n, x in (("cos", wind[2]), ("sin", -wind[1])))
     folded = zip(("mean", "cos", "sin"), FOLDED, strict=True) if harmonics else ()
     uniform = tuple(sheet.let(f"uniform_{n}", P["cos_tilt"] * x) for n, x in folded)
-    return Aerodynamics(normal, (kc, ks), (relative[1], relative[2]), skew, pressure, uniform)
+    return Aerodynamics(normal, (kc, ks), (relative[1], relative[2]), skew, pressure, sheet.states, uniform)
 
 
 def aero_resultant(sheet: Sheet, aero: Aerodynamics) -> tuple[sp.Matrix, sp.Matrix]:
@@ -810,7 +955,7 @@ def generator_torque(sheet: Sheet, controlled: bool) -> sp.Expr:
     """
     if controlled:
         return COMMANDED
-    w, blend = STATE[15], sheet.constant(P["tg_e"] ** 2)
+    w, blend = sheet.states.of("gen", 1), sheet.constant(P["tg_e"] ** 2)
     optimal = sheet.let("torque_optimal", P["tg_k"] * w * w)
     rise = sheet.let("torque_rise", P["tg_a2"] * (w - P["tg_ws"]) + P["tg_t2"] - optimal)
     below = sheet.let("torque_below", optimal + (rise + sp.sqrt(rise * rise + blend)) / 2)
@@ -820,7 +965,7 @@ def generator_torque(sheet: Sheet, controlled: bool) -> sp.Expr:
 
 def shaft_torque(sheet: Sheet) -> sp.Expr:
     """Torque of the drivetrain spring and damper on the rotor side."""
-    phi, gen, phid, gend = STATE[6], STATE[7], STATE[14], STATE[15]
+    phi, gen, phid, gend = (sheet.states.of(name, k) for k in (0, 1) for name in ("phi", "gen"))
     inverse = sheet.constant(1 / P["g_ratio"])
     return sheet.let("torque_shaft", P["d_k"] * (phi - gen * inverse) + P["d_d"] * (phid - gend * inverse))
 
@@ -830,8 +975,8 @@ def shaft_torque(sheet: Sheet) -> sp.Expr:
 
 def tower_and_nacelle(sheet: Sheet, top: Motion) -> tuple[dict[str, sp.Expr], dict[str, sp.Expr]]:
     """Mass terms and generalised forces of the two tower degrees of freedom without the rotor."""
-    a, s = STATE[0:2]
-    ad, sd = STATE[8:10]
+    a, s = tower(sheet)
+    ad, sd = tower(sheet, 1)
     n = offset(sheet, "nac", top, [P["n_x"], P["n_y"], P["n_z"]])
     tensor = sp.diag(P["n_ixx"], P["n_iyy"], P["n_izz"])
     spin_moment = sheet.let_vector("nac_moment", tensor * n.spin + cross(n.omega, tensor * n.omega))
@@ -850,9 +995,11 @@ def tower_and_nacelle(sheet: Sheet, top: Motion) -> tuple[dict[str, sp.Expr], di
     return mass, force
 
 
-def accelerations(harmonics: bool = False, controlled: bool = False) -> tuple[Sheet, tuple[sp.Expr, ...]]:
-    """The whole model: a sheet of assignments, and the 8 accelerations; harmonics: see `inflow`; controlled: `generator_torque`."""
-    sheet = Sheet()
+def accelerations(
+    states: States = T2B1I1CG, harmonics: bool = False, controlled: bool = False
+) -> tuple[Sheet, tuple[sp.Expr, ...]]:
+    """The whole model: a sheet of assignments, and the accelerations; harmonics: see `inflow`; controlled: `generator_torque`."""
+    sheet = Sheet(states)
     top = tower_top(sheet)
     m = hub(sheet, top)
     aero = inflow(sheet, m, harmonics)
@@ -876,40 +1023,87 @@ def accelerations(harmonics: bool = False, controlled: bool = False) -> tuple[Sh
         mass[j + k] = mass.get(j + k, 0) + t.dot(momentum[k]) + w.dot(angular[k])
     for key, (t, w) in columns.items():
         force[key] = force.get(key, 0) + t.dot(net_force) + w.dot(net_moment)
-        mass["e" + key] = t.dot(r.edge_linear) + w.dot(r.edge_angular)
+        if r.edge is not None:
+            mass["e" + key] = t.dot(r.edge.linear) + w.dot(r.edge.angular)
     force["p"] -= twist
 
     b_ff = sheet.constant(P["b_fxfx"] + P["b_fyfy"])
     b_fe = sheet.constant(P["b_fxex"] + P["b_fyey"])
-    mass["ee"] = sheet.constant(3 * (P["b_exex"] + P["b_eyey"]))
-    e, ed, f_mean = STATE[5], STATE[13], harmonic_symbols("f")[0]
-    elastic = P["b_ke"] * e + P["b_de"] * ed + P["b_kfe"] * f_mean
-    force["e"] = 3 * (aero.pressure * aero.mean("edge") - elastic) - r.edge
-    flap = flap_forces(sheet, m, aero)
+    if r.edge is not None:
+        mass["ee"] = sheet.constant(3 * (P["b_exex"] + P["b_eyey"]))
+        e, ed, f_mean = states.edge(1), states.edge(1, 1), harmonic_symbols("f")[0]
+        elastic = P["b_ke"] * e + P["b_de"] * ed + P["b_kfe"] * f_mean
+        force["e"] = 3 * (aero.pressure * aero.mean("edge") - elastic) - r.edge.force
+        force |= flap_forces(sheet, m, aero)
+    else:
+        force |= blade_forces(sheet, m, aero)
     for key, (t, w) in columns.items():
-        coupling = flap_coupling(sheet, t, w).at_blades(sheet, f"m_f_{key}")
-        for number in (1, 2, 3):
-            force[f"f{number}"] = flap[number - 1]
-            mass[f"f{number}{key}"] = sheet.let(f"m_f{number}{key}", coupling[number - 1])
-    result = solve(sheet, mass, force, b_ff, b_fe)
+        for mode in "fe" if states.own_edges else "f":
+            values = coupling(sheet, mode, t, w).at_blades(sheet, f"m_{mode}_{key}")
+            for number in (1, 2, 3):
+                mass[f"{mode}{number}{key}"] = sheet.let(f"m_{mode}{number}{key}", values[number - 1])
+    if states.own_edges:
+        b_ee = sheet.constant(P["b_exex"] + P["b_eyey"])
+        result = solve_own_edges(sheet, mass, force, b_ff, b_fe, b_ee)
+    else:
+        result = solve(sheet, mass, force, b_ff, b_fe)
     inverse = sheet.constant(1 / P["g_ratio"])
     generator = (twist * inverse - torque) * sheet.constant(1 / P["g_i"])
-    order = ("a", "s", "f1", "f2", "f3", "e", "p")
-    return sheet, (*(result[k] for k in order), sheet.let("x_gen", generator))
+    result |= {"phi": result["p"], "gen": sheet.let("x_gen", generator)}
+    return sheet, tuple(result[name] for name in states.coordinates)
 
 
-def flap_forces(sheet: Sheet, m: Motion, aero: Aerodynamics) -> list[sp.Expr]:
-    """Generalised force of each blade's flap at zero q''."""
-    carried, whirl = flap_coupling(sheet, m.acceleration, m.spin), flap_whirl(sheet, m.omega)
+def flap_forces(sheet: Sheet, m: Motion, aero: Aerodynamics) -> dict[str, sp.Expr]:
+    """Generalised force of each blade's flap at zero q'', where the blades share their edge."""
+    x = sheet.states
+    carried, whirl = coupling(sheet, "f", m.acceleration, m.spin), flap_whirl(sheet, m.omega)
     fixed = [
-        aero.pressure * q - x - y for q, x, y in zip(aero.flapwise(), carried.fixed, whirl.fixed, strict=True)
+        aero.pressure * q - x - y
+        for q, x, y in zip(aero.resting("flap"), carried.parts[""], whirl.parts[""], strict=True)
     ]
-    fixed[0] -= P["b_kfe"] * STATE[5]
-    by_flap = [-x - y for x, y in zip(carried.by_flap, whirl.by_flap, strict=True)]
+    fixed[0] -= P["b_kfe"] * x.edge(1)
+    by_flap = [-x - y for x, y in zip(carried.parts["f"], whirl.parts["f"], strict=True)]
     by_flap[0] -= P["b_kf"]
-    values = Flapwise(fixed, by_flap).at_blades(sheet, "q_f")
+    values = Bladewise({"": fixed, "f": by_flap}).at_blades(sheet, "q_f")
     damping = sheet.let("flap_damping", aero.pressure * TABLE["flap_flap"] - P["b_df"])
-    return [sheet.let(f"q_f{i + 1}", x + damping * STATE[10 + i]) for i, x in enumerate(values)]
+    return {f"f{i}": sheet.let(f"q_f{i}", values[i - 1] + damping * x.flap(i, 1)) for i in (1, 2, 3)}
+
+
+def blade_forces(sheet: Sheet, m: Motion, aero: Aerodynamics) -> dict[str, sp.Expr]:
+    """Generalised forces of each blade's flap and edge at zero q'', where each blade has both."""
+    x, b = sheet.states, blade_symbols(sheet)
+    # twice the moment about the blade's axis by which flap and edge turn into each other
+    gyroscopic = at_blades(
+        sheet, "gyro", [sheet.linear(q, m.omega) for q in over_azimuth(2 * b.coriolis() * to_hub([0, 0, 1]).dot(m.omega))]
+    )  # fmt: skip
+    out = {}
+    stiffness = {"ff": P["b_kf"], "ee": P["b_ke"], "fe": P["b_kfe"], "ef": P["b_kfe"]}
+    damping = {"f": P["b_df"], "e": P["b_de"]}
+    for mode, name in (("f", "flap"), ("e", "edge")):
+        outwards, variables = centrifugal(sheet, mode, m.omega)
+        carried, whirl = (
+            coupling(sheet, mode, m.acceleration, m.spin),
+            Bladewise.of(sheet, outwards, variables),
+        )
+        parts = {
+            k: [-x - y for x, y in zip(carried.parts[k], whirl.parts[k], strict=True)] for k in carried.parts
+        }
+        parts[""] = [aero.pressure * q + rest for q, rest in zip(aero.resting(name), parts[""], strict=True)]
+        for other in "fe":
+            parts[other][0] -= stiffness[mode + other]
+        values = Bladewise(parts).at_blades(sheet, f"q_{mode}")
+        by_flap, by_edge = (
+            sheet.let(
+                f"{name}_{other}",
+                aero.pressure * TABLE[f"{name}_{other}"] - (damping[mode] if other == name else 0),
+            )
+            for other in ("flap", "edge")
+        )
+        for i in (1, 2, 3):
+            d, g, turn = x.flap(i, 1), x.edge(i, 1), gyroscopic[i - 1]
+            total = values[i - 1] + by_flap * d + by_edge * g + (turn * d if mode == "e" else -turn * g)
+            out[f"{mode}{i}"] = sheet.let(f"q_{mode}{i}", total)
+    return out
 
 
 def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Expr]:
@@ -970,12 +1164,69 @@ def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Exp
     return x
 
 
+def solve_own_edges(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe, b_ee) -> dict[str, sp.Expr]:
+    """Block elimination of each blade's flap and edge (blocks that are the same constant for all), then LDL^T of the 3 x 3 rest.
+
+    With the edge rows less `ratio` times the flap rows a block is diagonal.
+    """
+    keys, blades = ("p", "a", "s"), (1, 2, 3)
+    ratio = sheet.constant(b_fe / b_ff)
+    weight = {"f": sheet.constant(1 / b_ff), "e": sheet.constant(1 / (b_ee - b_fe**2 / b_ff))}
+
+    def rows(of) -> dict[str, list[sp.Expr]]:
+        flap, edge = ([of(f"{mode}{n}") for n in blades] for mode in "fe")
+        return {"f": flap, "e": [y - ratio * x for x, y in zip(flap, edge, strict=True)]}
+
+    column = {k: rows(lambda name, k=k: mass[name + k]) for k in keys} | {"q": rows(lambda name: force[name])}
+    for k, found in column.items():
+        found["e"] = [sheet.let(f"own_{k}{n}", x) for n, x in zip(blades, found["e"], strict=True)]
+
+    def eliminated(i: str, j: str) -> sp.Expr:
+        """What the blades take from row i, column j (or `q`, the right side)."""
+        return sum(
+            weight[mode] * sum(x * y for x, y in zip(column[i][mode], column[j][mode], strict=True))
+            for mode in "fe"
+        )
+
+    lower: dict[tuple[str, str], sp.Expr] = {}
+    pivot: dict[str, sp.Expr] = {}
+    scaled_row: dict[tuple[str, str], sp.Expr] = {}
+    rhs: dict[str, sp.Expr] = {}
+    for r, i in enumerate(keys):
+        right = sheet.let(f"r_{i}", force[i] - eliminated(i, "q"))
+        for j in keys[: r + 1]:
+            m_ij = mass[i + j] if i + j in mass else mass[j + i]
+            s_ij = sheet.let(f"s_{i}{j}", m_ij - eliminated(i, j))
+            for k in keys[: keys.index(j)]:
+                s_ij = s_ij - lower[i, k] * scaled_row[j, k]
+            if i == j:
+                pivot[i] = sheet.let(f"inv_{i}", 1 / s_ij)
+            else:
+                scaled_row[i, j] = sheet.let(f"v_{i}{j}", s_ij)
+                lower[i, j] = sheet.let(f"l_{i}{j}", scaled_row[i, j] * pivot[j])
+        for j in keys[:r]:
+            right = right - lower[i, j] * rhs[j]
+        rhs[i] = sheet.let(f"z_{i}", right)
+    x: dict[str, sp.Expr] = {}
+    for r in range(len(keys) - 1, -1, -1):
+        i = keys[r]
+        x[i] = sheet.let(f"x_{i}", rhs[i] * pivot[i] - sum(lower[j, i] * x[j] for j in keys[r + 1 :]))
+    for n in blades:
+        flap, edge = (
+            weight[mode] * (column["q"][mode][n - 1] - sum(column[k][mode][n - 1] * x[k] for k in keys))
+            for mode in "fe"
+        )
+        x[f"e{n}"] = sheet.let(f"x_e{n}", edge)
+        x[f"f{n}"] = sheet.let(f"x_f{n}", flap - ratio * x[f"e{n}"])
+    return x
+
+
 # --- load channels -----------------------------------------------------------------------------------------------------
 
 
 def full_motion(m: Motion, sheet: Sheet, name: str, spin_rate: sp.Expr | int = 0) -> Motion:
     """The same motion with the actual accelerations in `acceleration` and `spin`; `spin_rate`: extra spin about x."""
-    add, sdd = ACCELERATION[0:2]
+    add, sdd = tower(sheet, 2)
     spin = m.spin + m.w_a * add + m.w_s * sdd + sp.Matrix([spin_rate, 0, 0])
     return Motion(
         m.t_a, m.t_s, m.w_a, m.w_s, m.omega,
@@ -988,8 +1239,8 @@ def blade_root(
     sheet: Sheet, aero: Aerodynamics, m: Motion, number: int
 ) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
     """One blade's force and moment about the apex on the hub, and its moment about the root, in coned axes."""
-    b = blade_symbols(number)
-    fdd, edd = ACCELERATION[1 + number], ACCELERATION[5]
+    b = blade_symbols(sheet, number)
+    fdd, edd = sheet.states.flap(number, 2), sheet.states.edge(number, 2)
     own = Motion(
         m.t_a, m.t_s, m.w_a, m.w_s,
         coned(sheet, "lw", m.omega, number),
@@ -1021,15 +1272,16 @@ def from_blade(v, number: int) -> sp.Matrix:
     return rot_x_t(c, -s, cone(v))
 
 
-def load_channels(harmonics: bool = False, controlled: bool = False) -> tuple[Sheet, dict[str, sp.Expr]]:
-    """Loads by their channel names from states, wind and the accelerations (`ACCELERATION`); harmonics and controlled as in
-    `accelerations`."""
-    sheet = Sheet()
-    harmonic_sums(sheet, ("d",))
+def load_channels(
+    states: States = T2B1I1CG, harmonics: bool = False, controlled: bool = False
+) -> tuple[Sheet, dict[str, sp.Expr]]:
+    """Loads by their channel names from states, wind and accelerations; harmonics and controlled as in `accelerations`."""
+    sheet = Sheet(states)
+    harmonic_sums(sheet, rates_only=True)
     top = tower_top(sheet)
     m = hub(sheet, top)
     aero = inflow(sheet, m, harmonics)
-    phidd = ACCELERATION[6]
+    phidd = states.of("phi", 2)
     rotating = full_motion(m, sheet, "hub", phidd)
     out: dict[str, sp.Expr] = {}
     force = -P["h_m"] * rotating.acceleration
@@ -1042,7 +1294,7 @@ def load_channels(harmonics: bool = False, controlled: bool = False) -> tuple[Sh
         # section axes turn with the pitch about e3, towards feather
         out[f"blade{number}_root_edgewise_moment"] = cp * root[0] - spitch * root[1]
         out[f"blade{number}_root_flapwise_moment"] = spitch * root[0] + cp * root[1]
-        b = blade_symbols(number)
+        b = blade_symbols(sheet, number)
         out[f"blade{number}_tip_out_of_plane"] = P["b_tip_fx"] * b.f + P["b_tip_ex"] * b.e
         out[f"blade{number}_tip_in_plane"] = P["b_tip_fy"] * b.f + P["b_tip_ey"] * b.e
     force = sheet.let_vector("rotor_force", force)
@@ -1051,14 +1303,14 @@ def load_channels(harmonics: bool = False, controlled: bool = False) -> tuple[Sh
     out["low_speed_shaft_torque"] = shaft_torque(sheet)
     out["generator_torque"] = generator_torque(sheet, controlled)
     out["rotor_thrust"] = sheet.constant(3 * P["cos_cone"]) * aero.mean("thrust") * aero.pressure
-    out["tower_top_fore_aft_acceleration"], out["tower_top_side_side_acceleration"] = ACCELERATION[0:2]
+    out["tower_top_fore_aft_acceleration"], out["tower_top_side_side_acceleration"] = tower(sheet, 2)
     return sheet, out
 
 
 def tower_base(sheet: Sheet, top: Motion, force: sp.Matrix, moment: sp.Matrix) -> dict[str, sp.Expr]:
     """Tower-base moments from the rotor's force and moment about the apex (in F), nacelle, generator and tower."""
-    a, s = STATE[0:2]
-    add, sdd = ACCELERATION[0:2]
+    a, s = tower(sheet)
+    add, sdd = tower(sheet, 2)
 
     def to_n(v):
         x, y, z = rot_x_t(COSINE, -SINE, v)
@@ -1074,7 +1326,7 @@ def tower_base(sheet: Sheet, top: Motion, force: sp.Matrix, moment: sp.Matrix) -
     turning = tensor * nacelle.spin + cross(nacelle.omega, tensor * nacelle.omega)
     # the generator's housing carries the torque that does not accelerate its rotor
     shaft_axis = sp.Matrix([P["cos_tilt"], 0, P["sin_tilt"]])
-    generator = shaft_axis * (P["g_i"] * ACCELERATION[7])
+    generator = shaft_axis * (P["g_i"] * sheet.states.of("gen", 2))
     moment_n = sheet.let_vector("top_moment", moment_n + cross(arm, weight) - turning - generator)
     cos_a, sin_a, cos_r, sin_r = sp.symbols("pitch_cos pitch_sin roll_cos roll_sin", real=True)
 

@@ -6,7 +6,7 @@ A `Variant` is one generated module: which layout, whether the pitch is an input
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
@@ -14,10 +14,10 @@ from sympy.printing.pycode import PythonCodePrinter
 from fatigue_runner.channels import LOAD_NAMES
 from fatigue_runner.control import BASELINE
 from fatigue_runner.control import Submodel as Controller
-from fatigue_runner.layout import T2B1I1CG, Layout
+from fatigue_runner.layout import FAMILIES, T2B1I1CG, Layout
+from fatigue_runner.layout import PITCH as PITCH_SIGNAL
 from fatigue_runner.turbine.derivation import equations as eq
 from fatigue_runner.turbine.derivation.pitching import PITCH, with_varying_pitch
-from fatigue_runner.turbine.model import FIXED_PITCH, VARYING_PITCH
 
 Lines = list[tuple[sp.Symbol, sp.Expr]]
 
@@ -36,6 +36,7 @@ class Variant:
     doc: str
     source: str
     layout: Layout = T2B1I1CG
+    states: eq.States = eq.T2B1I1CG
     varying_pitch: bool = False
     submodels: tuple[Submodel, ...] = field(default=())
     controller: Controller | None = None
@@ -70,16 +71,22 @@ class Variant:
     def symbols(self) -> dict[str, sp.Symbol]:
         """Symbol of every state and signal by its name: the equations' own where they have one."""
         names = [c.name for c in (*self.layout.states, *self.layout.wind, *self.layout.control)]
-        return {name: _OWN.get(name, sp.Symbol(name, real=True)) for name in names}
+        moving = zip(names, self.states.all, strict=False)  # first-order states and signals follow
+        own = {
+            **dict(moving),
+            **dict(zip((c.name for c in T2B1I1CG.wind), eq.WIND, strict=True)),
+            "pitch": PITCH,
+        }
+        return {name: own.get(name, sp.Symbol(name, real=True)) for name in names}
 
     @property
     def tables(self) -> tuple[str, ...]:
         """Names of the coefficients, those of the equations first."""
-        return eq.HARMONIC_TABLES if self.layout.harmonics else eq.TABLES
+        return eq.tables(self.states, self.layout.harmonics)[0]
 
     @property
     def equation_tables(self) -> int:
-        return eq.HARMONIC_TABLES_OF_THE_EQUATIONS if self.layout.harmonics else eq.TABLES_OF_THE_EQUATIONS
+        return eq.tables(self.states, self.layout.harmonics)[1]
 
     @property
     def inputs(self) -> dict[sp.Symbol, str]:
@@ -91,13 +98,6 @@ class Variant:
         ):  # fmt: skip
             out |= {symbols[signal.name]: f"{array}[{i}]" for i, signal in enumerate(signals)}
         return out
-
-
-_OWN = {
-    **dict(zip(T2B1I1CG.names, eq.STATE, strict=True)),
-    **dict(zip((c.name for c in T2B1I1CG.wind), eq.WIND, strict=True)),
-    "pitch": PITCH,
-}
 
 
 class Printer(PythonCodePrinter):
@@ -217,10 +217,10 @@ def kernel(
     inputs = variant.inputs
     if derivative:
         first = variant.layout.freedoms
-        inputs |= {s: f"derivative[{first + i}]" for i, s in enumerate(eq.ACCELERATION)}
+        inputs |= {s: f"derivative[{first + i}]" for i, s in enumerate(variant.states.symbols(2))}
     inputs[eq.HALF_SQRT3] = repr(3**0.5 / 2)
     inputs |= {c: f"constants[{i}]" for i, c in enumerate(constants)}
-    phi = eq.STATE[variant.layout.rotor]
+    phi = variant.states.of("phi")
     source = [f"{phi} = {inputs.pop(phi)}"]
     if PITCH in inputs:
         source.append(f"{PITCH} = {inputs.pop(PITCH)}")
@@ -286,9 +286,9 @@ def module(variant: Variant) -> str:
     """A generated module: its head, the constants, and the kernels `rhs` and `loads`."""
     layout = variant.layout
     controlled = variant.controller is not None
-    sheet, accelerations = eq.accelerations(layout.harmonics, controlled)
-    load_sheet, loads = eq.load_channels(layout.harmonics, controlled)
-    out = dict(enumerate(eq.STATE[layout.freedoms :])) | {
+    sheet, accelerations = eq.accelerations(variant.states, layout.harmonics, controlled)
+    load_sheet, loads = eq.load_channels(variant.states, layout.harmonics, controlled)
+    out = dict(enumerate(variant.states.symbols(1))) | {
         layout.freedoms + i: a for i, a in enumerate(accelerations)
     }
     load_out = {i: loads[n] for i, n in enumerate(LOAD_NAMES)}
@@ -330,30 +330,46 @@ def module(variant: Variant) -> str:
 
 
 _FOLDER = "fatigue_runner/turbine/derivation"
-VARIANTS = {
-    "kernel": Variant("The lane kernels at a fixed pitch.", f"{_FOLDER}/equations.py", FIXED_PITCH.layout),
-    "pitched": Variant(
-        "The lane kernels with each lane's pitch [rad] as a control signal.",
-        f"{_FOLDER}/equations.py and pitching.py",
-        VARYING_PITCH.layout,
-        varying_pitch=True,
-    ),
-    "harmonic": Variant(
-        "The lane kernels at a fixed pitch, under wind with azimuthal harmonics.",
-        f"{_FOLDER}/equations.py",
-        FIXED_PITCH.layout.extended(harmonics=True),
-    ),
-    "controlled": Variant(
-        "The lane kernels with the baseline controller's states, pitch and torque, under wind with azimuthal harmonics.",
-        f"{_FOLDER}/equations.py and pitching.py, and fatigue_runner/control/baseline.py",
-        FIXED_PITCH.layout.extended(first_order=BASELINE.states, harmonics=True),
-        varying_pitch=True,
-        controller=BASELINE,
-    ),
-    "pitched_harmonic": Variant(
-        "The lane kernels with each lane's pitch [rad] as a control signal, under wind with azimuthal harmonics.",
-        f"{_FOLDER}/equations.py and pitching.py",
-        VARYING_PITCH.layout.extended(harmonics=True),
-        varying_pitch=True,
-    ),
-}
+_STATES = {"t2b1i1cg": eq.T2B1I1CG, "t2b2cg": eq.T2B2CG}
+
+
+def _variants(family: str) -> dict[str, Variant]:
+    """The generated modules of one member of the family, by their names."""
+    prefix = "" if family == "t2b1i1cg" else f"{family}_"
+    layout = FAMILIES[family]
+    equations, pitching = f"{_FOLDER}/equations.py", f"{_FOLDER}/equations.py and pitching.py"
+    pitched = layout.extended(control=(PITCH_SIGNAL,))
+    made = {
+        "kernel": Variant("The lane kernels at a fixed pitch", equations, layout),
+        "pitched": Variant(
+            "The lane kernels with each lane's pitch [rad] as a control signal",
+            pitching,
+            pitched,
+            varying_pitch=True,
+        ),
+        "harmonic": Variant(
+            "The lane kernels at a fixed pitch, under wind with azimuthal harmonics",
+            equations,
+            layout.extended(harmonics=True),
+        ),
+        "controlled": Variant(
+            "The lane kernels with the baseline controller's states, pitch and torque, under wind with azimuthal harmonics",
+            f"{pitching}, and fatigue_runner/control/baseline.py",
+            layout.extended(first_order=BASELINE.states, harmonics=True),
+            varying_pitch=True,
+            controller=BASELINE,
+        ),
+        "pitched_harmonic": Variant(
+            "The lane kernels with each lane's pitch [rad] as a control signal, under wind with azimuthal harmonics",
+            pitching,
+            pitched.extended(harmonics=True),
+            varying_pitch=True,
+        ),
+    }
+    what = "." if not prefix else ", each blade with an edge mode of its own."
+    return {
+        f"{prefix}{name}": replace(v, doc=v.doc + what, states=_STATES[family]) for name, v in made.items()
+    }
+
+
+VARIANTS = {name: variant for family in FAMILIES for name, variant in _variants(family).items()}
