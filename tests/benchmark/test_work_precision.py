@@ -316,6 +316,7 @@ def test_the_kernel_benchmark_finds_packed_code_faster_than_scalar_code():
     assert 0.01 < found["share_of_peak"] < 1.0
     assert np.isfinite([s["over_kernel"] for s in found["whole_steps"]]).all()
     assert 0 < found["varying_pitch"]["median"] < np.inf
+    assert 1.0 < found["own_edges"]["ratio"] < 1.4
 
 
 @pytest.mark.slow(reason="the whole shipped benchmark: all methods, all correctors, two sets of winds")

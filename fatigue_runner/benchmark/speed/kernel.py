@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.benchmark.speed import machine, right_hand_side
-from fatigue_runner.channels import STATE_NAMES, WIND_NAMES
+from fatigue_runner.channels import WIND_NAMES
 from fatigue_runner.turbine.lane_code import LANES
 
 CASES = (1, 8, 16, 64, 256)
@@ -56,7 +56,7 @@ def _work(
     groups = -(-cases // lanes)
     speeds = np.linspace(5.0, 10.0, 16)
     points = [turbine.operating_point(v) for v in speeds]
-    x = np.empty((groups, len(STATE_NAMES), lanes))
+    x = np.empty((groups, turbine.layout.size, lanes))
     wind, pitch = np.zeros((groups, len(WIND_NAMES), lanes)), np.zeros((groups, 1, lanes))
     for i in range(groups * lanes):
         x[i // lanes, :, i % lanes] = points[i % 16]
@@ -156,6 +156,8 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     packed, scalar = right_hand_side.packed(), right_hand_side.scalar()
     work = {f"packed {n}": _work(packed, turbine, n, LANES) for n in CASES}
     work |= {f"scalar {n}": _work(scalar, turbine, n, 1) for n in CASES}
+    edges = load_turbine("nrel5mw_edges")
+    work["own edges"] = _work(right_hand_side.packed_of(edges), edges, CASES[-1], LANES)
     work["pitched"] = _work(right_hand_side.varying(), turbine, CASES[-1], LANES, pitched=True)
     work |= {f"step {name}": whole_steps(turbine, name) for name in STEP_METHODS}
     work["peak"] = peak()
@@ -189,5 +191,6 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
         "share_of_peak": flops / best / rate,
         "cases": rows,
         "varying_pitch": found["pitched"],
+        "own_edges": {"time": found["own edges"], "ratio": found["own edges"]["median"] / best},
         "whole_steps": steps,
     }

@@ -37,6 +37,11 @@ def packed() -> Callable[..., None]:
     return _repeated(kernel.rhs)
 
 
+def packed_of(turbine: Any) -> Callable[..., None]:
+    """The same with the equations of another turbine."""
+    return _repeated(turbine.kernel_data(0.0).model.generated.rhs)
+
+
 def varying() -> Callable[..., None]:
     """The same with a pitch of its own for every lane."""
     return _repeated(pitched.rhs)
