@@ -11,6 +11,7 @@ from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.fatigue import damage_equivalent_load, rainflow
 from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
 from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
+from fatigue_runner.results.told_life import lifetime
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.values import unmasked
 from fatigue_runner.wind import (
@@ -38,6 +39,7 @@ __all__ = [
     "TurbulentWind",
     "correctors",
     "damage_equivalent_load",
+    "lifetime",
     "load_turbine",
     "rainflow",
     "run_campaign",

@@ -150,10 +150,12 @@ def _print_outcome(results: Results, console: Console) -> None:
     """Which integrator is good enough and what it costs, what was lost, and where the files are."""
     from rich.markup import escape
 
-    from fatigue_runner.report.terminal import print_ranking
+    from fatigue_runner.report.terminal import print_life, print_ranking
 
     console.print()
     print_ranking(results.rows, console)
+    if results.life is not None:
+        print_life(results.life, results.rows, console)
     for row in results.lost[:10]:
         when = (
             f"at {row['diverged_at']:.4g} s" if row["status"] == "diverged" else f": {row['error_message']}"

@@ -45,6 +45,8 @@ def build_world(monkeypatch: Any) -> World:
         hash="0" * 64,
         parameters={"g_ratio": 97.0},
         rotor=Rotor(63.0, 90.0),
+        sections={"tower_base": (6.0, 0.027)},
+        operating_wind=(5.0, 11.0),
         operated=lambda operation: turbine,
         layout=T2B1I1CG,
         kernel_data=lambda pitch: None,

@@ -39,7 +39,7 @@ MAY_IMPORT = {
     "wind": {"inputs"},
     "fatigue": set(),
     "logbook": set(),
-    "results": {"inputs"},
+    "results": {"inputs", "fatigue"},
     "integrators": {"turbine", "wind"},
     "corrector": {"inputs", "turbine", "wind", "integrators"},
     "report": {"inputs", "fatigue", "logbook", "results"},
@@ -68,7 +68,7 @@ MAY_IMPORT = {
         "report",
         "viewer",
     },
-    "api": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "campaign"},
+    "api": {"turbine", "wind", "integrators", "corrector", "fatigue", "logbook", "results", "campaign"},
     "cli": None,  # anything: it is the roof
     "__init__": {"api"},
     "__main__": {"cli"},

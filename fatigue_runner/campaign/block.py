@@ -21,6 +21,7 @@ from fatigue_runner.campaign.evaluate import (
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.fatigue.sections import Wall
 from fatigue_runner.results.columns import DESCRIPTION
 from fatigue_runner.trajectory import Trajectory
 
@@ -35,6 +36,7 @@ class Setup:
     logs: Path
     metadata: dict[str, str] = field(default_factory=dict)  # of every log's `run` record
     attachments: dict[str, bytes] = field(default_factory=dict)
+    walls: dict[str, Wall] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ def run_block(job: Job) -> list[dict[str, Any]]:
             try:
                 if isinstance(outcome, Exception):
                     raise outcome
-                own = evaluate(outcome, job.setup.campaign)
+                own = evaluate(outcome, job.setup.campaign, job.setup.walls)
                 if integration.is_reference:
                     references[case.wind] = own if outcome.diverged_at is None else None
                 if case.id in wanted:

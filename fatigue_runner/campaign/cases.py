@@ -39,6 +39,9 @@ def make_cases(resolved: Resolved) -> list[Case]:
     campaign = resolved.campaign
     common = campaign.model_dump(include={"duration", "output_rate", "initial", "pitch"})
     evaluation = campaign.model_dump(include={"fatigue", "discard"}) | {"log": campaign.log.model_dump()}
+    evaluation["walls"] = {
+        place: [wall.circle.diameter, wall.circle.wall] for place, wall in resolved.walls.items()
+    }
     cases = []
     for wind in resolved.winds:
         reference_hash = ""

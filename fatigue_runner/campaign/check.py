@@ -8,15 +8,18 @@ from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.campaign.spec import Pitch
 from fatigue_runner.errors import InputError
+from fatigue_runner.results.lifetime_section import check_covered
 
 
 def check(resolved: Resolved) -> list[str]:
     """Sentences that a person should read before the run.
 
     Raises InputError, with the line, for a step above the stability limit, a corrector that does not fit, a method that cannot
-    take the campaign's pitch, a step that is too long for the wind's harmonics, and a channel to log that not every wind has.
+    take the campaign's pitch, a step that is too long for the wind's harmonics, a channel to log that not every wind has, and winds
+    that make no bins of a life.
     """
     _check_logged_channels(resolved)
+    _check_lifetime(resolved)
     for integration in resolved.integrations:
         try:
             _check(integration, resolved)
@@ -37,6 +40,20 @@ def _check_logged_channels(resolved: Resolved) -> None:
                 f"{resolved.source.where(('log', 'channels', index))}: {name!r} cannot be logged, the wind has {harmonics} azimuthal "
                 f"harmonic{'s' * (harmonics != 1)}; remove it or give the wind more `harmonics`"
             )
+
+
+def _check_lifetime(resolved: Resolved) -> None:
+    """The winds must fill the bins of a life; under control these must cover the operating range."""
+    section = resolved.campaign.lifetime
+    if section is None:
+        return
+    try:
+        bins = section.bins_of([wind.source.mean_speed for wind in resolved.winds])
+        operating = resolved.operating_wind
+        if operating is not None and section.operating_range is None:
+            check_covered(bins, operating)
+    except InputError as error:
+        raise InputError(f"{resolved.source.where(('lifetime', 'bins'))}: lifetime: {error}") from None
 
 
 class _Refused(Exception):

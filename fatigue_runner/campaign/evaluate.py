@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,18 +14,20 @@ from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.errors import FatigueRunnerError
-from fatigue_runner.results.columns import WIND, columns, fatigue_keys
+from fatigue_runner.fatigue.sections import Wall
+from fatigue_runner.results.columns import WIND, columns, damage_keys, fatigue_keys
 from fatigue_runner.results.table import known
 from fatigue_runner.trajectory import Trajectory
 
 
 @dataclass
 class Evaluated:
-    """A trajectory, the part that counts, and its DELs {(channel, exponent): value or None}."""
+    """A trajectory, the part that counts, its DELs {(channel, exponent): value or None}, and damage a year {column: value}."""
 
     whole: Trajectory
     trajectory: Trajectory
     loads: dict[tuple[str, float], float | None]
+    damage: dict[str, float] = field(default_factory=dict)
 
 
 def discarded(trajectory: Trajectory, discard: float) -> Trajectory:
@@ -42,8 +46,10 @@ def discarded(trajectory: Trajectory, discard: float) -> Trajectory:
     )
 
 
-def evaluate(trajectory: Trajectory, campaign: Campaign) -> Evaluated:
-    """Count every fatigue channel once, all exponents on the same cycles; a diverged case has no loads."""
+def evaluate(
+    trajectory: Trajectory, campaign: Campaign, walls: Mapping[str, Wall] = MappingProxyType({})
+) -> Evaluated:
+    """Count every fatigue channel once, all exponents on the same cycles, and the walls of places; a diverged case has no loads."""
     from fatigue_runner.fatigue import channel_fatigue
 
     finite = np.isfinite(trajectory.state).all(axis=1)
@@ -60,7 +66,19 @@ def evaluate(trajectory: Trajectory, campaign: Campaign) -> Evaluated:
             kept.loads[channel], fatigue.wohler_exponents, kept.duration, fatigue.residue
         )
         loads |= {(channel, m): result.load(m) for m in fatigue.wohler_exponents}
-    return Evaluated(trajectory, kept, loads)
+    return Evaluated(trajectory, kept, loads, _damage(kept, campaign, walls))
+
+
+def _damage(kept: Trajectory, campaign: Campaign, walls: Mapping[str, Wall]) -> dict[str, float]:
+    """Damage a year around every place, by column; nothing for one whose moments have no fatigue."""
+    found: dict[str, float] = {}
+    angles = campaign.fatigue.angles
+    for place, wall in walls.items():
+        damage = wall.damage_per_year(kept.loads, kept.duration, campaign.fatigue.residue)
+        if damage is not None:
+            columns = [column for _, _, column in damage_keys({place: angles[place]})]
+            found |= {column: float(value) for column, value in zip(columns, damage, strict=True)}
+    return found
 
 
 def scaled_error(test: Trajectory, reference: Trajectory) -> np.ndarray:
@@ -92,6 +110,7 @@ def make_row(
         return row
     speed = own.trajectory.wind[:, 0]
     row["rotor_intensity"] = np.std(speed) / np.mean(speed)
+    row |= own.damage
     row |= {f"del_{suffix}": own.loads[channel, m] for channel, m, suffix in _fatigue(campaign)}
     row |= {
         f"{name}_{channel}": function(series)
@@ -114,7 +133,9 @@ def failed_row(case: Case, wind: Any, error: Exception, campaign: Campaign) -> d
 
 def empty_row(case: Case, campaign: Campaign) -> dict[str, Any]:
     """Every column, with what is known of a case before it runs."""
-    row: dict[str, Any] = dict.fromkeys(columns(campaign.fatigue.channels, campaign.fatigue.wohler_exponents))
+    row: dict[str, Any] = dict.fromkeys(
+        columns(campaign.fatigue.channels, campaign.fatigue.wohler_exponents, angles=campaign.fatigue.angles)
+    )
     return row | {
         "case_id": case.id,
         "method": case.integration.method,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fatigue_runner.campaign.integration import Integration, file_hash, load_corrector
 from fatigue_runner.campaign.spec import Campaign, IntegratorSection
 from fatigue_runner.errors import InputError
+from fatigue_runner.fatigue.sections import Wall
 from fatigue_runner.inputs.source import Place, Source
 from fatigue_runner.inputs.sweep import expand
 from fatigue_runner.rotor import Rotor
@@ -49,6 +50,12 @@ class Resolved:
     pitch: float | PitchSeries
     integrations: list[Integration]  # the reference first
     winds: list[ResolvedWind]
+    walls: dict[str, Wall] = field(default_factory=dict)  # of the places whose damage is counted
+
+    @property
+    def operating_wind(self) -> tuple[float, float] | None:
+        """Where the turbine turns [m/s]; known of one under control only."""
+        return self.turbine.operating_wind if self.campaign.operation == "controlled" else None
 
     def ensemble(
         self, winds: Sequence[ResolvedWind] | None = None, duration: float | None = None
@@ -74,7 +81,19 @@ def resolve(campaign: Campaign, source: Source) -> Resolved:
     pitch = _pitch(campaign, turbine, source)
     integrations = _integrations(campaign, source)
     winds = _winds(campaign, turbine, pitch, source)
-    return Resolved(campaign, source, turbine, turbine_source, pitch, integrations, winds)
+    walls = _walls(campaign, turbine, source)
+    return Resolved(campaign, source, turbine, turbine_source, pitch, integrations, winds, walls)
+
+
+def _walls(campaign: Campaign, turbine: Turbine, source: Source) -> dict[str, Wall]:
+    """The walls whose damage is counted, by place; refused where the turbine does not say how thick they are."""
+    found = {}
+    for index, entry in enumerate(campaign.fatigue.damage):
+        try:
+            found[entry.place] = entry.wall(turbine.sections)
+        except InputError as error:
+            raise InputError(f"{source.where(('fatigue', 'damage', index))}: {error}") from None
+    return found
 
 
 def _turbine_source(campaign: Campaign, source: Source) -> str:

@@ -64,6 +64,11 @@ def run_campaign(
         simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress, watch)
         results = _collect(plan, store, simulated)
         results.write()
+        if plan.campaign.lifetime is not None:
+            from fatigue_runner.results.lifetime import life_of
+
+            results.life = life_of(results.rows, plan.campaign.lifetime)
+            results.life.write(results.out)
         progress.say("writing the report")
         _write_report(results)
     results.wall_time = time.perf_counter() - started
@@ -96,6 +101,7 @@ def _simulate(
         store.out.resolve() / "logs",
         facts,
         {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan.resolved).encode()},
+        plan.resolved.walls,
     )
     about_run = {"facts": facts, "campaign": plan.campaign.model_dump(), "wind": wind_words(plan.resolved)}
     store.open(about_run, text)
@@ -125,7 +131,7 @@ def _collect(plan: Plan, store: Store, simulated: int) -> Results:
     fatigue = plan.campaign.fatigue
     return Results(
         out=store.out,
-        columns=columns(fatigue.channels, fatigue.wohler_exponents),
+        columns=columns(fatigue.channels, fatigue.wohler_exponents, angles=fatigue.angles),
         rows=[store.records[case.id]["row"] for case in plan.cases],
         simulated=simulated,
         kept=len(plan.cases) - simulated,

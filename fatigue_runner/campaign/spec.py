@@ -2,7 +2,7 @@
 
 name            names the run folder; letters, digits, `.`, `_`, `-`
 turbine         `nrel5mw` (default), `t2b1i1cg` (the paper's: no tilt, no cone) or the path of a turbine YAML
-duration        simulated time of every case [s]
+duration        simulated time of every case [s]; or `analysis_time` and `transient_time`, which is `duration` less `discard`, and `discard`
 output_rate     samples per second [Hz] of what is counted, compared and logged (default 50), at any step
 initial         state at t = 0: `operating-point` (default), `paper`, `paper-spinning`, or 16 numbers (a controller's states begin
                 as if these had been so for long)
@@ -24,6 +24,9 @@ reference       {method, step}: what the integrators are measured against (defau
 fatigue.channels          load channels that are counted (default: blade 1 root and tower base, two each)
 fatigue.wohler_exponents  default [3, 4, 5, 10, 12]
 fatigue.residue           what the rainflow residue counts as: `half` (default, ASTM), `full`, `drop`
+fatigue.damage            list of {place, curve, ...}: Miner's sum around the wall of a section, see `campaign/damage_section.py`
+
+lifetime         the life that the cases stand for, from the site's wind: {climate, years, ...}, see `results/lifetime_section.py`
 
 log.enabled      one MCAP file per case in logs/ (default true)
 log.compression  `zstd` (default), `lz4` or `none`
@@ -53,12 +56,14 @@ from pydantic import (
 )
 
 from fatigue_runner import shipped
+from fatigue_runner.campaign.damage_section import DamageSection
 from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, problem, validated
 from fatigue_runner.inputs.source import Source, read_mapping
 from fatigue_runner.inputs.sweep import Piece, Sweep, check_not_empty, expand
 from fatigue_runner.integrators.initial import INITIAL_STATES
+from fatigue_runner.results.lifetime_section import LifetimeSection
 from fatigue_runner.wind.section import WindSection, wind_section
 
 if TYPE_CHECKING:
@@ -132,6 +137,25 @@ class Fatigue(Section):
         default=[3.0, 4.0, 5.0, 10.0, 12.0]
     )
     residue: Literal["half", "full", "drop"] = "half"
+    damage: list[DamageSection] = Field(default=[])
+
+    @field_validator("damage")
+    @classmethod
+    def _each_place_once(cls, damage: list[DamageSection]) -> list[DamageSection]:
+        for index, entry in enumerate(damage):
+            if any(entry.place == other.place for other in damage[:index]):
+                raise problem(
+                    f"{entry.place!r} stands twice; remove one, or run the other curve as a campaign of its own"
+                )
+        return damage
+
+    @property
+    def angles(self) -> dict[str, list[int]]:
+        """The azimuths [deg] of every place, for the columns of the results."""
+        return {
+            entry.place: [round(i * 360 / entry.azimuths) for i in range(entry.azimuths)]
+            for entry in self.damage
+        }
 
     @field_validator("channels")
     @classmethod
@@ -227,6 +251,29 @@ class Campaign(Section):
     reference: Annotated[Reference | None, BeforeValidator(_none_in_words)] = Reference()
     fatigue: Fatigue = Fatigue()
     log: Log = Log()
+    lifetime: LifetimeSection | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _times_by_their_names_in_weis(cls, data: Any) -> Any:
+        """`analysis_time` after `transient_time`, which is left out, for `duration` and `discard`."""
+        if not isinstance(data, dict) or not {"analysis_time", "transient_time"} & data.keys():
+            return data
+        for key in ("analysis_time", "transient_time"):
+            for own in ("duration", "discard"):
+                if key in data and own in data:
+                    raise problem(
+                        f"is part of what {own!r} says; keep `duration` and `discard`, or the other two",
+                        key=key,
+                    )
+        if "analysis_time" not in data:
+            raise problem("needs `analysis_time` beside it", key="transient_time")
+        found = data["analysis_time"], data.get("transient_time", 0.0)
+        for key, value, least in zip(("analysis_time", "transient_time"), found, (1e-9, 0.0), strict=True):
+            if not _is_number(value) or value < least:
+                raise problem(f"must be {'above 0' if least else 'at least 0'} s; got {value!r:.60}", key=key)
+        others = {key: value for key, value in data.items() if key not in ("analysis_time", "transient_time")}
+        return others | {"duration": float(sum(found)), "discard": float(found[1])}
 
     @model_validator(mode="after")
     def _who_steers(self) -> Campaign:

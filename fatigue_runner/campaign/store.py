@@ -4,7 +4,7 @@
     run.json        the resolved campaign, versions and the turbine's hash: whose folder this is
     cases.jsonl     one line per finished case, appended as blocks of cases come in
     logs/           <case id>.mcap
-    results.csv, results.parquet, report.html
+    results.csv, results.parquet, lifetime.csv, damage.csv, report.html
 
 A finished case is kept when its hash is unchanged and its log is complete.
 """
@@ -143,7 +143,7 @@ class Store:
         for case_id in self._read_records():
             self.log_path(case_id).unlink(missing_ok=True)
         self._journal.truncate(0)
-        for name in ("results.csv", "results.parquet", "report.html"):
+        for name in ("results.csv", "results.parquet", "lifetime.csv", "damage.csv", "report.html"):
             (self.out / name).unlink(missing_ok=True)
 
 

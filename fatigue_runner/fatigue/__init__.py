@@ -6,6 +6,14 @@ condition (`channel_fatigue`), never a number.
 """
 
 from fatigue_runner.fatigue.checks import FatigueInputError
+from fatigue_runner.fatigue.climate import (
+    Climate,
+    TableClimate,
+    WindBins,
+    WindClimate,
+    bin_probabilities,
+    iec_climate,
+)
 from fatigue_runner.fatigue.damage import (
     ChannelFatigue,
     channel_fatigue,
@@ -19,10 +27,7 @@ from fatigue_runner.fatigue.damage import (
 )
 from fatigue_runner.fatigue.lifetime import (
     LifetimeLoad,
-    WindClimate,
-    bin_probabilities,
     case_probabilities,
-    iec_climate,
     lifetime_equivalent_load,
 )
 from fatigue_runner.fatigue.rainflow import rainflow
@@ -31,9 +36,12 @@ from fatigue_runner.fatigue.sn_curves import SN_CURVES, SNCurve, sn_curve
 __all__ = [
     "SN_CURVES",
     "ChannelFatigue",
+    "Climate",
     "FatigueInputError",
     "LifetimeLoad",
     "SNCurve",
+    "TableClimate",
+    "WindBins",
     "WindClimate",
     "bin_probabilities",
     "case_probabilities",

@@ -1,8 +1,7 @@
-"""From simulations to a lifetime: the wind climate's bin probabilities and the power sum over bins."""
+"""From simulations to a lifetime: what each case counts for, and the power sum over the cases."""
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,62 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.errors import did_you_mean
 from fatigue_runner.fatigue.checks import FatigueInputError, non_negative, positive
+from fatigue_runner.fatigue.climate import Climate, bin_probabilities
 
-SECONDS_PER_YEAR = 8760.0 * 3600.0
-
-# Reference wind speed V_ref [m/s]; source: IEC 61400-1:2019, table 1.
-IEC_REFERENCE_SPEED = {"I": 50.0, "II": 42.5, "III": 37.5}
-
-
-@dataclass(frozen=True)
-class WindClimate:
-    """Weibull distribution of the ten-minute mean wind speed, by its mean [m/s] and shape (2 is Rayleigh)."""
-
-    mean_speed: float
-    shape: float = 2.0
-    name: str = "Weibull"
-
-    def __post_init__(self) -> None:
-        positive("the mean wind speed", self.mean_speed)
-        positive("the Weibull shape", self.shape)
-
-    @property
-    def scale(self) -> float:
-        """Weibull scale [m/s], from the mean."""
-        return self.mean_speed / math.gamma(1.0 + 1.0 / self.shape)
-
-    def exceedance(self, speed: Any) -> np.ndarray:
-        """Probability that the wind speed [m/s] is exceeded, 1 - CDF; same shape as `speed`."""
-        return np.exp(-((np.maximum(np.asarray(speed, dtype=np.float64), 0.0) / self.scale) ** self.shape))
+HOURS_PER_YEAR = 8760.0  # as in IEC 61400-1 and pCrunch; a mean year of 365.25 days would be 0.07 % longer
+SECONDS_PER_YEAR = HOURS_PER_YEAR * 3600.0
 
 
-def iec_climate(wind_class: str) -> WindClimate:
-    """Rayleigh climate of an IEC class, V_ave = 0.2 V_ref. Source: IEC 61400-1:2019, 6.3.2.1."""
-    if wind_class not in IEC_REFERENCE_SPEED:
-        raise FatigueInputError(
-            f"unknown IEC wind class {wind_class!r}{did_you_mean(wind_class, IEC_REFERENCE_SPEED)}"
-        )
-    return WindClimate(0.2 * IEC_REFERENCE_SPEED[wind_class], name=f"IEC class {wind_class}")
-
-
-def bin_probabilities(climate: WindClimate, centres: Any, width: float) -> np.ndarray:
-    """Probability of each wind-speed bin (n,), from the distribution function, not from the density.
-
-    centres: (n,) [m/s], each bin reaching `width`/2 to both sides; their sum is what they cover, not 1.
-    Raises FatigueInputError for bins that overlap, since their wind would count twice.
-    """
-    v, half = np.atleast_1d(non_negative("bin centres", centres)), 0.5 * positive("the bin width", width)
-    gaps = np.diff(np.sort(v))
-    if (gaps < 2.0 * half * (1.0 - 1e-9)).any():
-        raise FatigueInputError(
-            f"bins of width {width:g} m/s overlap: two centres are {gaps.min():g} m/s apart"
-        )
-    return climate.exceedance(v - half) - climate.exceedance(v + half)
-
-
-def case_probabilities(climate: WindClimate, speeds: Sequence[float], width: float) -> np.ndarray:
+def case_probabilities(climate: Climate, speeds: Sequence[float], width: float) -> np.ndarray:
     """Probability of each case (n,): the cases (seeds) of one wind speed [m/s] share their bin's equally."""
     cases = [float(v) for v in speeds]
     seeds = Counter(cases)
@@ -130,11 +81,38 @@ def lifetime_equivalent_load(
     exponent, cycles = positive("the Wöhler exponent m", m), positive("n_eq", n_eq)
     covered = float(p[done].sum())
     weights = p[done] / covered if renormalise and covered > 0.0 else p[done]
-    load = None
-    if values.size:
-        largest = float(values.max()) or 1.0  # scaled, so that no power overflows
-        lifetime = positive("years", years) * SECONDS_PER_YEAR * positive("frequency", frequency)
-        load = float(
-            largest * (weights @ (values / largest) ** exponent * lifetime / cycles) ** (1.0 / exponent)
-        )
+    lifetime = positive("years", years) * SECONDS_PER_YEAR * positive("frequency", frequency)
+    load = (
+        float(power_mean(values, weights, exponent) * (lifetime / cycles) ** (1.0 / exponent))
+        if values.size
+        else None
+    )
     return LifetimeLoad(load, exponent, cycles, float(years), covered, float(p[~done].sum()), renormalise)
+
+
+def power_mean(values: np.ndarray, weights: np.ndarray, m: float) -> Any:
+    """(Σ w vᵐ)^(1/m) of values (n,) not negative; weights (n,) give a float, (r, n) an array (r,)."""
+    largest = float(values.max(initial=0.0)) or 1.0  # scaled, so that no power overflows
+    return largest * (weights @ (values / largest) ** m) ** (1.0 / m)
+
+
+def resampled(places: Sequence[int], samples: int, seed: int = 0) -> np.ndarray:
+    """How often each case is drawn, (samples, n), when the seeds of every bin are drawn anew with replacement.
+
+    places: the bin of each case. Deterministic: the same bins and `seed` give the same draws. One case in a bin is always drawn, so
+    that its bin adds no scatter. Source: Efron (1979), the bootstrap, within strata.
+    """
+    bins = np.asarray(places, dtype=int)
+    draw = np.random.default_rng(seed)
+    counts = np.empty((samples, bins.size))
+    for place in np.unique(bins):
+        mine = np.flatnonzero(bins == place)
+        counts[:, mine] = draw.multinomial(mine.size, np.full(mine.size, 1.0 / mine.size), size=samples)
+    return counts
+
+
+def interval(values: np.ndarray, confidence: float) -> tuple[float, float]:
+    """The percentile interval of bootstrapped figures (samples,): what lies outside of it has 1 - confidence."""
+    tail = 50.0 * (1.0 - confidence)
+    low, high = np.percentile(values, [tail, 100.0 - tail])
+    return float(low), float(high)

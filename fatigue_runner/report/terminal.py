@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from fatigue_runner.results.lifetime import Life
+
 
 def print_ranking(rows: Sequence[Row], console: Console) -> None:
     """A table of the integrators and the answer in words."""
@@ -30,6 +32,23 @@ def print_ranking(rows: Sequence[Row], console: Console) -> None:
     console.print(_table(rows, summaries, console))
     for sentence in [*answer(summaries), *unseen_winds(summaries)]:
         console.print(escape(sentence))
+
+
+def print_life(life: Life, rows: Sequence[Row], console: Console) -> None:
+    """The life in words: how long, which wind, which integrator is good enough, what to distrust."""
+    from rich.markup import escape
+
+    from fatigue_runner.results import life_words as words
+
+    console.print(f"\n[bold]A life of {life.section.years:g} years[/]")
+    for sentence in [
+        *words.places_in_words(life),
+        *words.loads_in_words(life),
+        *words.integrator_in_words(life, rank(rows)),
+    ]:
+        console.print(escape(sentence))
+    for sentence in [*life.statement(), *words.distrust(life)]:
+        console.print(f"[dim]{escape(sentence)}[/]")
 
 
 def _table(rows: Sequence[Row], summaries: Sequence[MethodSummary], console: Console) -> Table:

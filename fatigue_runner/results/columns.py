@@ -6,7 +6,7 @@ what was simulated.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -82,15 +82,28 @@ _FATIGUE = (
 _STATISTICS = (("mean", "mean"), ("min", "smallest"), ("max", "largest"))
 
 
+def damage_keys(angles: Mapping[str, Sequence[int]]) -> list[tuple[str, int, str]]:
+    """(place, azimuth [deg], its column): `damage_tower_base_015`."""
+    return [
+        (place, angle, f"damage_{place}_{angle:03d}") for place, found in angles.items() for angle in found
+    ]
+
+
 def fatigue_keys(channels: Sequence[str], exponents: Sequence[float]) -> list[tuple[str, float, str]]:
     """(channel, exponent, suffix of its columns): `blade1_root_flapwise_moment_m10`."""
     return [(channel, m, f"{channel}_m{m:g}") for channel in channels for m in exponents]
 
 
 def table(
-    channels: Sequence[str], exponents: Sequence[float], states: Sequence[Channel] = STATES
+    channels: Sequence[str],
+    exponents: Sequence[float],
+    states: Sequence[Channel] = STATES,
+    angles: Mapping[str, Sequence[int]] | None = None,
 ) -> list[Column]:
-    """All columns of the results table in their order, for these fatigue channels, Wöhler exponents and states."""
+    """All columns of the results table in their order, for these fatigue channels, Wöhler exponents and states.
+
+    angles: the azimuths [deg] around each place whose wall is counted.
+    """
     loads = {load.name: load for load in LOADS}
     errors = [
         Column(f"nrmse_{state.name}", "accuracy", f"RMS error over the reference's range: {state.label}")
@@ -101,19 +114,31 @@ def table(
         for channel, m, suffix in fatigue_keys(channels, exponents)
         for figure, meaning, unit in _FATIGUE
     ]  # fmt: skip
+    damage = [
+        Column(
+            column,
+            "fatigue",
+            f"Miner's sum of a year of this wind: {place.replace('_', ' ')} at {angle} deg",
+            "1/year",
+        )
+        for place, angle, column in damage_keys(angles or {})
+    ]
     statistics = [
         Column(f"{figure}_{load.name}", "statistics", f"{word}: {load.label}", load.unit)
         for load in LOADS
         for figure, word in _STATISTICS
     ]
-    return [*CASE, *errors, *fatigue, *statistics]
+    return [*CASE, *errors, *fatigue, *damage, *statistics]
 
 
 def columns(
-    channels: Sequence[str], exponents: Sequence[float], states: Sequence[Channel] = STATES
+    channels: Sequence[str],
+    exponents: Sequence[float],
+    states: Sequence[Channel] = STATES,
+    angles: Mapping[str, Sequence[int]] | None = None,
 ) -> list[str]:
     """Their names."""
-    return [column.name for column in table(channels, exponents, states)]
+    return [column.name for column in table(channels, exponents, states, angles)]
 
 
 def of_group(*groups: Group) -> tuple[str, ...]:

@@ -8,11 +8,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.results.columns import NEEDED, kind_of
+from fatigue_runner.results.frames import to_arrow, to_pandas
+
+if TYPE_CHECKING:
+    from fatigue_runner.results.lifetime import Life
 
 
 def known(value: Any) -> Any:
@@ -26,7 +30,7 @@ class Results:
     """The outcome of a campaign: one row per case, in the order of the campaign.
 
     rows: dicts with every column, None where a figure is unknown; out: the run folder; `simulated` and `kept`
-    count the cases that ran now and those that an earlier run had finished.
+    count the cases that ran now and those that an earlier run had finished; life: what they stand for, where the campaign asks for it.
     """
 
     out: Path
@@ -36,6 +40,7 @@ class Results:
     kept: int = 0
     wall_time: float = 0.0
     report_error: str = ""
+    life: Life | None = None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -70,17 +75,21 @@ class Results:
         write_atomically(self.out / "results.csv", text.getvalue().encode())
         self._write_parquet()
 
+    def to_pandas(self) -> Any:
+        """The table as a pandas DataFrame, where pandas is installed."""
+        return to_pandas(self.rows, self.columns)
+
+    def to_arrow(self) -> Any:
+        """The table as a pyarrow Table, where pyarrow is installed."""
+        return to_arrow(self.rows, {name: kind_of(name) for name in self.columns})
+
     def _write_parquet(self) -> None:
         try:
-            import pyarrow as pa
             import pyarrow.parquet as pq
         except ImportError:
             return
-
-        types = {"text": pa.string(), "truth": pa.bool_(), "whole": pa.int64(), "number": pa.float64()}
-        schema = pa.schema([(name, types[kind_of(name)]) for name in self.columns])
         buffer = io.BytesIO()
-        pq.write_table(pa.Table.from_pylist(self.rows, schema=schema), buffer)
+        pq.write_table(self.to_arrow(), buffer)
         write_atomically(self.out / "results.parquet", buffer.getvalue())
 
 

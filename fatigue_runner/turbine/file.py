@@ -278,6 +278,26 @@ class Aerodynamics(Section):
         return self
 
 
+class CircleSection(Section):
+    """A circular section by its outer diameter and wall [m]."""
+
+    diameter: Positive
+    wall: Positive
+
+    @model_validator(mode="after")
+    def _fits(self) -> CircleSection:
+        if not 2 * self.wall < self.diameter:
+            raise problem(f"{self.wall:g} m does not fit into a diameter of {self.diameter:g} m", key="wall")
+        return self
+
+
+class Sections(Section):
+    """Where wear is counted; no motion depends on it."""
+
+    tower_base: CircleSection | None = None
+    blade_root: CircleSection | None = None
+
+
 class TurbineFile(Section):
     """A whole turbine file, its base merged in."""
 
@@ -294,12 +314,21 @@ class TurbineFile(Section):
     control: Control | None = None
     blade: Blade
     tower: Tower
+    sections: Sections | None = None
+    operating_wind: list[float] | None = Field(default=None, min_length=2, max_length=2)
     aerodynamics: Aerodynamics
 
     @field_validator("model")
     @classmethod
     def _known_model(cls, model: str) -> str:
         return known_name(model, FAMILIES)
+
+    @field_validator("operating_wind")
+    @classmethod
+    def _from_cut_in_to_cut_out(cls, wind: list[float] | None) -> list[float] | None:
+        if wind is not None and not 0 <= wind[0] < wind[1]:
+            raise problem(f"must be [cut-in, cut-out] in m/s, rising; got {wind}")
+        return wind
 
 
 class AirfoilFile(Section):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,7 +40,9 @@ class Turbine:
 
     family: `t2b1i1cg` (the blades share one edge mode) or `t2b2cg` (each has its own);
     control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it;
-    tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees.
+    tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees;
+    sections {name: (outer diameter, wall) [m]}: circles whose wear is counted, which change no motion;
+    operating_wind: from cut-in to cut-out [m/s], None where the file does not say.
     """
 
     name: str
@@ -52,6 +54,8 @@ class Turbine:
     operation: str = FIXED
     tower: tuple[tuple[float, float], ...] = ()
     family: str = DEFAULT_FAMILY
+    sections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    operating_wind: tuple[float, float] | None = None
 
     @property
     def layout(self) -> Layout:
@@ -331,9 +335,16 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     given = data.get("control") if data["generator"]["law"] == "regions" else None
     control = Control.model_validate(given).model_dump() if given else None
     tower = tuple((float(height), float(diameter)) for height, diameter in data["tower"].get("diameters", ()))
+    sections = {
+        where: (float(circle["diameter"]), float(circle["wall"]))
+        for where, circle in (data.get("sections") or {}).items()
+        if circle
+    }
+    wind = data.get("operating_wind")
     return Turbine(
-        name, parameters, tables, description, UNCONTROLLED[family], control, tower=tower, family=family
-    )
+        name, parameters, tables, description, UNCONTROLLED[family], control, tower=tower, family=family,
+        sections=sections, operating_wind=None if wind is None else (float(wind[0]), float(wind[1])),
+    )  # fmt: skip
 
 
 def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, PlainValidator, ValidationInfo, field_validator, model_validator
 
@@ -31,7 +31,10 @@ def _seeds(value: Any) -> int | list[int]:
     if isinstance(value, list):
         if not value or not all(type(seed) is int and seed >= 0 for seed in value):
             raise problem(f"must be a count or a list of whole numbers, 0 or more; got {value!r:.60}")
-        return list(dict.fromkeys(value))
+        twice = next((seed for i, seed in enumerate(value) if seed in value[:i]), None)
+        if twice is not None:
+            raise problem(f"seed {twice} stands twice; the same wind would count twice: remove one")
+        return list(value)
     if type(value) is not int or not 1 <= value <= 999:
         raise problem(f"must be a count from 1 to 999 or a list of seeds; got {value!r:.60}")
     return value
@@ -47,13 +50,14 @@ class TurbulentSection(WindSection):
     wind_class         `I`, `II` or `III`
     shear_exponent     power-law exponent alpha of the mean wind (default 0.2), or
     roughness_length   z_0 [m] of a logarithmic mean wind
-    seeds              how many per speed (default 1), numbers that no other speed has: 600001, 600002, ... at 6 m/s; or a list of
-                       numbers for every speed. One number is another turbulence at every speed
+    seeds              how many per speed (default 1; also `n_seeds`), numbers that no other speed has: 600001, 600002, ... at 6 m/s; or a
+                       list of numbers for every speed. One number is another turbulence at every speed
     harmonics          azimuthal harmonics that the blades feel: 6 (default) hold 98 % of every load range, 1 is mean and linear shears
     spectrum           `kaimal` (default) or `von-karman`
     """
 
     kind = "turbulent"
+    synonyms: ClassVar = {"n_seeds": "seeds"}
 
     speeds: Sweep
     intensity: float | None = Field(default=None, gt=0, le=1)

@@ -13,8 +13,8 @@ from places import SHARED
 
 from fatigue_runner import fatigue as fa
 from fatigue_runner.errors import InputError
+from fatigue_runner.fatigue.climate import IEC_REFERENCE_SPEED
 from fatigue_runner.fatigue.damage import channel_condition
-from fatigue_runner.fatigue.lifetime import IEC_REFERENCE_SPEED
 
 CASES_FILE = SHARED / "fatigue_cases.json"
 CASES = json.loads(CASES_FILE.read_text()) if CASES_FILE.exists() else []

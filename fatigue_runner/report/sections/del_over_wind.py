@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from statistics import pstdev
 from typing import TYPE_CHECKING
 
@@ -25,6 +24,7 @@ from fatigue_runner.report.style import (
     to_svg,
 )
 from fatigue_runner.results.cells import Row, number, numbers, text
+from fatigue_runner.results.life_words import customary_exponent
 from fatigue_runner.results.ranking import MethodSummary
 
 if TYPE_CHECKING:
@@ -52,12 +52,6 @@ def build(run: Run) -> Section:
     return Section(
         title, [Figure(_draw(run, panels, shown), caption, "Damage-equivalent loads over wind speed")]
     )
-
-
-def customary_exponent(channel: str, exponents: Iterable[float]) -> float:
-    """The exponent nearest to the material's: 10 for a blade's composite, 4 for welded steel elsewhere."""
-    wanted = 10.0 if channel.startswith("blade") else 4.0
-    return min(exponents, key=lambda m: (abs(m - wanted), m))
 
 
 def _panels(run: Run) -> list[tuple[str, float, str]]:
