@@ -50,7 +50,7 @@ def evaluate(
     trajectory: Trajectory, campaign: Campaign, walls: Mapping[str, Wall] = MappingProxyType({})
 ) -> Evaluated:
     """Count every fatigue channel once, all exponents on the same cycles, and the walls of places; a diverged case has no loads."""
-    from fatigue_runner.fatigue import channel_fatigue
+    from fatigue_runner.fatigue import count_channels
 
     finite = np.isfinite(trajectory.state).all(axis=1)
     if not finite.all():
@@ -60,12 +60,15 @@ def evaluate(
     if trajectory.diverged_at is not None:
         return Evaluated(trajectory, kept, {})
     fatigue = campaign.fatigue
-    loads: dict[tuple[str, float], float | None] = {}
-    for channel in fatigue.channels:
-        result = channel_fatigue(
-            kept.loads[channel], fatigue.wohler_exponents, kept.duration, fatigue.residue
-        )
-        loads |= {(channel, m): result.load(m) for m in fatigue.wohler_exponents}
+    counted = count_channels(
+        {channel: kept.loads[channel] for channel in fatigue.channels},
+        fatigue.wohler_exponents,
+        kept.duration,
+        fatigue.residue,
+    )
+    loads = {
+        (channel, m): found.load(m) for channel, found in counted.items() for m in fatigue.wohler_exponents
+    }
     return Evaluated(trajectory, kept, loads, _damage(kept, campaign, walls))
 
 
@@ -116,6 +119,12 @@ def make_row(
         f"{name}_{channel}": function(series)
         for channel, series in own.trajectory.loads.items()
         for name, function in (("mean", np.mean), ("min", np.min), ("max", np.max))
+    }
+    time = own.trajectory.time
+    row |= {
+        f"{name}_{channel}": time[function(series)]
+        for channel, series in own.trajectory.loads.items()
+        for name, function in (("min_time", np.argmin), ("max_time", np.argmax))
     }
     if reference is not None and not case.integration.is_reference:
         errors = _errors(own, reference, campaign)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.campaign.about import about, resolved_yaml, turbine_yaml, wind_words
-from fatigue_runner.campaign.block import Setup, run_block
+from fatigue_runner.campaign.block import Job, Setup, run_block
 from fatigue_runner.campaign.plan import Plan, make_plan
 from fatigue_runner.campaign.pool import connect, run_jobs
 from fatigue_runner.campaign.store import Store
@@ -89,8 +90,6 @@ def _simulate(
     plan: Plan, store: Store, workers: int, dask: str | None, progress: Any, watch: Watch | None = None
 ) -> int:
     """Run the cases that are not finished; returns how many there were."""
-    from fatigue_runner import integrators
-
     progress.say("checking the reference")
     facts = about(plan.resolved) | reference_facts(plan, store.earlier)
     text = resolved_yaml(plan.resolved)
@@ -110,7 +109,7 @@ def _simulate(
         pending = sum(len(job.cases) for job in jobs)
         progress.begin(len(plan.cases), len(plan.cases) - pending)
         if jobs:
-            integrators.warm_up()  # here, once, so that the workers load the kernels from the cache
+            _warm_up(plan, jobs)
         progress.say("running")
         ids = [[case.id for case in job.cases] for job in jobs]
         with watch(store.out, len(plan.cases), ids, workers) if watch else nullcontext():
@@ -125,6 +124,27 @@ def _simulate(
         ) from None
     finally:
         store.close()
+
+
+def _warm_up(plan: Plan, jobs: Sequence[Job]) -> None:
+    """Compile what the pending cases need, here and once, so that the workers load it from the cache: a few steps of every method."""
+    from fatigue_runner import integrators
+    from fatigue_runner.fatigue import count_channels
+
+    count_channels({"": [0.0, 1.0, 0.0, 1.0]}, plan.campaign.fatigue.wohler_exponents, 1.0)
+    pending = [case.integration for job in jobs for case in (*job.references, *job.cases)]
+    methods = {(found.method, found.corrector, found.mode): found for found in pending}
+    winds = {wind.source.triples > 0: wind for wind in plan.resolved.winds}
+    for found in methods.values():
+        outputs = 1 + math.ceil(2 * found.step * plan.campaign.output_rate)
+        for wind in winds.values():
+            try:
+                short = plan.resolved.ensemble(
+                    [wind], min(outputs / plan.campaign.output_rate, plan.campaign.duration)
+                )
+                integrators.simulate(short, found.build())
+            except FatigueRunnerError:
+                continue  # what is wrong shows when the cases run
 
 
 def _collect(plan: Plan, store: Store, simulated: int) -> Results:

@@ -17,6 +17,7 @@ from fatigue_runner.fatigue.climate import (
 from fatigue_runner.fatigue.damage import (
     ChannelFatigue,
     channel_fatigue,
+    count_channels,
     damage_equivalent_load,
     damage_ratio,
     equivalent_load,
@@ -32,6 +33,14 @@ from fatigue_runner.fatigue.lifetime import (
 )
 from fatigue_runner.fatigue.rainflow import rainflow
 from fatigue_runner.fatigue.sn_curves import SN_CURVES, SNCurve, sn_curve
+from fatigue_runner.fatigue.spectra import (
+    exceedance,
+    extremes,
+    level_crossings,
+    load_duration,
+    markov_matrix,
+    spectrum,
+)
 
 __all__ = [
     "SN_CURVES",
@@ -46,15 +55,22 @@ __all__ = [
     "bin_probabilities",
     "case_probabilities",
     "channel_fatigue",
+    "count_channels",
     "damage_equivalent_load",
     "damage_ratio",
     "equivalent_load",
+    "exceedance",
+    "extremes",
     "goodman",
     "iec_climate",
+    "level_crossings",
     "lifetime_equivalent_load",
+    "load_duration",
     "load_error",
+    "markov_matrix",
     "miner_damage",
     "rainflow",
     "short_term_cycles",
     "sn_curve",
+    "spectrum",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,7 +15,7 @@ from fatigue_runner.fatigue.checks import (
     non_negative,
     positive,
 )
-from fatigue_runner.fatigue.rainflow import rainflow
+from fatigue_runner.fatigue.rainflow import rainflow, residue_count
 from fatigue_runner.fatigue.sn_curves import SNCurve, sn_curve
 from fatigue_runner.values import unmasked
 
@@ -136,19 +136,40 @@ def channel_fatigue(
     series: (n,) [unit of the channel]; duration [s] sets n_eq at 1 Hz. Raises FatigueInputError for bad
     exponents or duration only.
     """
+    return count_channels({"": series}, exponents, duration, residue)[""]
+
+
+def count_channels(
+    loads: Mapping[str, Any], exponents: Sequence[float], duration: float, residue: str = "half"
+) -> dict[str, ChannelFatigue]:
+    """What every channel of a case wore, in one compiled call: each is counted once, all exponents on the same cycles.
+
+    loads {channel: (n,)}, of one length; duration [s] sets n_eq at 1 Hz. A channel that is not finite, too short or constant has a
+    condition. Raises FatigueInputError for bad exponents, duration or residue only.
+    """
     n_eq = short_term_cycles(duration)
-    values = np.ascontiguousarray(np.ma.filled(np.ma.asarray(series, dtype=np.float64), np.nan))
-    condition = channel_condition(values)
-    if condition is not None:
-        return ChannelFatigue(condition)
-    ranges, _, counts = rainflow(values, residue)
-    loads = equivalent_load(ranges, counts, list(exponents), n_eq)
-    return ChannelFatigue(
-        None,
-        cycles=float(counts.sum()),
-        largest_range=float(ranges.max(initial=0.0)),
-        loads={float(m): float(load) for m, load in zip(exponents, loads, strict=True)},
-    )
+    wanted = np.array([positive("the Wöhler exponent m", m) for m in exponents])
+    share = residue_count(residue)
+    found: dict[str, ChannelFatigue] = {}
+    block = {}
+    for name, series in loads.items():
+        values = np.ascontiguousarray(np.ma.filled(np.ma.asarray(series, dtype=np.float64), np.nan))
+        condition = channel_condition(values)
+        if condition is None:
+            block[name] = values
+        else:
+            found[name] = ChannelFatigue(condition)
+    if block:
+        from fatigue_runner.fatigue import (
+            kernel,
+        )  # numba takes long to import, and a campaign's worker has it anyway
+
+        sums, largest, total = kernel.channel_sums(np.stack(list(block.values())), wanted, share)
+        equivalent = largest[:, None] * (sums / n_eq) ** (1.0 / wanted)
+        for i, name in enumerate(block):
+            by_exponent = {float(m): float(load) for m, load in zip(exponents, equivalent[i], strict=True)}
+            found[name] = ChannelFatigue(None, float(total[i]), float(largest[i]), by_exponent)
+    return {name: found[name] for name in loads}
 
 
 def channel_condition(values: np.ndarray) -> str | None:

@@ -83,3 +83,43 @@ def count(series: np.ndarray, residue_count: float) -> tuple[np.ndarray, np.ndar
     ranges, means, counts = (np.empty(max(points.size - 1, 0)) for _ in range(3))
     n = three_point(points, residue_count, ranges, means, counts)
     return ranges[:n], means[:n], counts[:n]
+
+
+@njit(nogil=True)
+def power(base: float, m: float) -> float:
+    """`base` to a power above zero; whole ones by squaring, a fifth of the time of the general one."""
+    whole = int(m)
+    if whole != m:
+        return base**m
+    result = 1.0
+    while whole > 0:
+        if whole % 2 == 1:
+            result *= base
+        base *= base
+        whole //= 2
+    return result
+
+
+@njit(nogil=True)
+def channel_sums(block: Array, exponents: Array, residue_count: float) -> tuple[Array, Array, Array]:
+    """Every channel of `block` (channels, n >= 3), finite, counted once: (Σ n (S/S_max)ᵐ (channels, exponents), S_max, Σ n).
+
+    Ranges are taken over the largest, so that no power overflows whatever the unit.
+    """
+    channels, n = block.shape
+    sums = np.zeros((channels, exponents.size))
+    largest, total = np.zeros(channels), np.zeros(channels)
+    points, ranges, means, counts = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    for c in range(channels):
+        top = reversals(block[c], points)
+        cycles = three_point(points[:top], residue_count, ranges, means, counts)
+        for i in range(cycles):
+            largest[c] = max(largest[c], ranges[i])
+            total[c] += counts[i]
+        if largest[c] == 0.0:
+            continue
+        for i in range(cycles):
+            relative = ranges[i] / largest[c]
+            for k in range(exponents.size):
+                sums[c, k] += counts[i] * power(relative, exponents[k])
+    return sums, largest, total

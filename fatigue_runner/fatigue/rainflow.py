@@ -13,6 +13,13 @@ from fatigue_runner.fatigue.checks import FatigueInputError, finite_series
 RESIDUE = {"half": 0.5, "full": 1.0, "drop": 0.0}
 
 
+def residue_count(residue: str) -> float:
+    """What a range that never closes counts for; FatigueInputError for an unknown residue."""
+    if residue not in RESIDUE:
+        raise FatigueInputError(f"unknown residue {residue!r}{did_you_mean(str(residue), RESIDUE)}")
+    return RESIDUE[residue]
+
+
 def rainflow(series: Any, residue: str = "half") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Cycles of a load series: ranges, means and counts, each (cycles,), in the order in which they close.
 
@@ -26,11 +33,10 @@ def rainflow(series: Any, residue: str = "half") -> tuple[np.ndarray, np.ndarray
     of the PyPI package `rainflow` 3.2, but for a constant series, which that package counts as half a cycle
     of range 0.
     """
-    if residue not in RESIDUE:
-        raise FatigueInputError(f"unknown residue {residue!r}{did_you_mean(str(residue), RESIDUE)}")
+    share = residue_count(residue)
     values = finite_series(series)
     if values.size < 3:
         return np.empty(0), np.empty(0), np.empty(0)
     from fatigue_runner.fatigue import kernel  # numba takes longer to import than most series take to count
 
-    return kernel.count(values, RESIDUE[residue])
+    return kernel.count(values, share)

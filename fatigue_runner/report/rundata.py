@@ -18,11 +18,13 @@ from fatigue_runner.errors import FatigueRunnerError, InputError
 from fatigue_runner.inputs.source import read_mapping
 from fatigue_runner.results.cells import Row, number, text
 from fatigue_runner.results.columns import WIND
+from fatigue_runner.results.lifetime_section import LifetimeSection
 from fatigue_runner.results.ranking import MethodSummary, fatigue_columns, integrator_key, rank, reference_of
 from fatigue_runner.results.table import read_results
 
 if TYPE_CHECKING:
     from fatigue_runner.logbook import Log
+    from fatigue_runner.results.lifetime import Life
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,22 @@ class Run:
         winds = [WindCase(number(rows[0], "wind_speed"), key, tuple(rows)) for key, rows in groups.items()]
         return sorted(winds, key=lambda wind: (wind.speed is None, wind.speed or 0.0, wind.key))
 
+    @cached_property
+    def life(self) -> Life | None:
+        """What the cases stand for; None where the campaign does not say of which life, or a wind is missing."""
+        given = self.setting("lifetime")
+        if given is None:
+            return None
+        from fatigue_runner.results.lifetime import life_of
+
+        try:
+            return life_of(self.rows, LifetimeSection.model_validate(_known(given)))
+        except (InputError, ValueError) as error:
+            self.no_life = " ".join(str(error).split())
+            return None
+
+    no_life: str = ""  # why there is none
+
     def setting(self, path: str, default: Any = None) -> Any:
         """A value of the resolved campaign by its dotted path; `default` where it is absent or null."""
         value: Any = self.campaign
@@ -94,6 +112,10 @@ class Run:
         if case_id not in self._logs:
             self._logs[case_id] = _read_log(self.folder / "logs" / f"{case_id}.mcap")
         return self._logs[case_id]
+
+    def forget_log(self, case_id: str) -> None:
+        """Let go of a log that was read, so that a report of hundreds of cases does not hold them all."""
+        self._logs.pop(case_id, None)
 
     @cached_property
     def facts(self) -> list[tuple[str, str]]:
@@ -125,6 +147,10 @@ class Run:
     def _facts_of_a_log(self) -> dict[str, str]:
         logs = (self.log(text(row, "case_id")) for row in self.rows[:20])
         return next((dict(log.run) for log in logs if log is not None), {})
+
+
+def _known(section: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in section.items() if value is not None}
 
 
 def load_run(folder: Path) -> Run:

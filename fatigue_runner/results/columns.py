@@ -79,7 +79,10 @@ _FATIGUE = (
     ("del_error", "relative error of that load against the reference's", "-"),
     ("damage_ratio", "damage over the reference's", "-"),
 )
-_STATISTICS = (("mean", "mean"), ("min", "smallest"), ("max", "largest"))
+_STATISTICS = (
+    ("mean", "mean", None), ("min", "smallest", None), ("max", "largest", None),
+    ("min_time", "simulated time of the smallest", "s"), ("max_time", "simulated time of the largest", "s"),
+)  # fmt: skip
 
 
 def damage_keys(angles: Mapping[str, Sequence[int]]) -> list[tuple[str, int, str]]:
@@ -124,9 +127,9 @@ def table(
         for place, angle, column in damage_keys(angles or {})
     ]
     statistics = [
-        Column(f"{figure}_{load.name}", "statistics", f"{word}: {load.label}", load.unit)
+        Column(f"{figure}_{load.name}", "statistics", f"{word}: {load.label}", unit or load.unit)
         for load in LOADS
-        for figure, word in _STATISTICS
+        for figure, word, unit in _STATISTICS
     ]
     return [*CASE, *errors, *fatigue, *damage, *statistics]
 

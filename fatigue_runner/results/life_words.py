@@ -88,11 +88,12 @@ def loads_in_words(life: Life) -> list[str]:
     if not said:
         return ["No lifetime load: no case counts."]
     return [
-        f"Lifetime equivalent loads for {_cycles(life.section.n_eq)} cycles in {life.section.years:g} years: {'; '.join(said)}."
+        f"Lifetime equivalent loads for {cycles_text(life.section.n_eq)} cycles in {life.section.years:g} years: {'; '.join(said)}."
     ]
 
 
-def _cycles(number: float) -> str:
+def cycles_text(number: float) -> str:
+    """A number of cycles as a person reads it: 1e7."""
     return f"{number:g}".replace("e+0", "e").replace("e+", "e")
 
 

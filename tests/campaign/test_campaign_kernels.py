@@ -125,12 +125,24 @@ def test_a_shipped_campaign_is_valid_and_its_resolved_form_means_the_same(path, 
     assert [case.hash for case in make_plan(copy).cases] == [case.hash for case in plan.cases]
 
 
-def test_the_quickstart_is_the_one_promised():
+def test_the_quickstart_shows_a_turbulent_life():
     plan = make_plan(CAMPAIGNS / "quickstart.yaml")
-    speeds = {dict(case.wind.parameters)["speed"] for case in plan.cases}
-    assert len(speeds) == 12 and min(speeds) == 5 and max(speeds) == 10
-    assert {case.integration.method for case in plan.cases} == {"heun", "rk3", "rk4", "rk7"}
-    assert plan.campaign.duration == 60 and plan.campaign.turbine == "nrel5mw"
+    assert {wind.source.mean_speed for wind in plan.resolved.winds} == {4, 8, 12, 16, 20, 24}
+    assert {case.integration.method for case in plan.cases} == {"heun", "rk3", "rk4", "dop853"}
+    assert (plan.campaign.operation, plan.campaign.turbine) == ("controlled", "nrel5mw")
+    assert plan.campaign.lifetime is not None and plan.campaign.wind.type == "turbulent"
+
+
+def test_dlc_1_2_is_that_of_the_standard():
+    plan = make_plan(CAMPAIGNS / "dlc12.yaml")
+    assert sorted({wind.source.mean_speed for wind in plan.resolved.winds}) == list(range(4, 25, 2))
+    assert len(plan.resolved.winds) == 66 and all(wind.source.harmonics == 6 for wind in plan.resolved.winds)
+    assert (plan.campaign.duration, plan.campaign.discard, plan.campaign.operation) == (
+        720,
+        120,
+        "controlled",
+    )
+    assert len({case.integration for case in plan.cases}) >= 4
 
 
 @pytest.mark.parametrize(("name", "beyond"), [("paper_in_range", 0), ("paper_out_of_range", 50)])
@@ -206,7 +218,7 @@ def test_run_campaign_takes_a_mapping_and_returns_the_table(tmp_path):
 def test_ctrl_c_ends_with_130_leaves_no_worker_and_the_same_command_goes_on(tmp_path):
     text = (CAMPAIGNS / "quickstart.yaml").read_text()
     campaign = tmp_path / "long.yaml"
-    campaign.write_text(text.replace("name: quickstart", "name: long").replace("count: 12", "count: 200"))
+    campaign.write_text(text.replace("name: quickstart", "name: long").replace("seeds: 2 ", "seeds: 200 "))
     command = [sys.executable, "-m", "fatigue_runner", "run", str(campaign), "--out", str(tmp_path / "out")]
     # a test run in the background may ignore SIGINT, which its children would inherit
     listening = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)

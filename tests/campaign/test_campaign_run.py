@@ -80,7 +80,8 @@ def test_the_csv_has_the_columns_in_order_and_empty_cells_for_the_unknown(world,
         rows = list(reader)
     assert reader.fieldnames == columns(FATIGUE_CHANNELS, [3, 4, 5, 10, 12])
     assert reader.fieldnames[:3] == ["case_id", "wind_source", "wind_speed"]
-    assert reader.fieldnames[-3:] == [f"{name}_{LOAD_NAMES[-1]}" for name in ("mean", "min", "max")]
+    figures = ("mean", "min", "max", "min_time", "max_time")
+    assert reader.fieldnames[-5:] == [f"{name}_{LOAD_NAMES[-1]}" for name in figures]
     assert rows[0]["nrmse_max"] == rows[0]["corrector"] == rows[0]["delta_t"] == ""
     assert "nan" not in (out / "results.csv").read_text()
     assert float(rows[1]["nrmse_max"]) == results.rows[1]["nrmse_max"]

@@ -1,5 +1,6 @@
 """Rainflow counting against the standard's example and, cycle for cycle, the PyPI package `rainflow`."""
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -8,6 +9,7 @@ import rainflow as reference
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from fatigue_runner import fatigue as fa
 from fatigue_runner.errors import InputError
 from fatigue_runner.fatigue import rainflow
 
@@ -157,3 +159,27 @@ def test_what_lies_below_a_mask_is_refused_and_an_open_mask_is_none():
     assert isinstance(refused.value, ValueError)
     for values in (np.ma.array(ASTM_SERIES), np.ma.array(ASTM_SERIES, mask=[False] * len(ASTM_SERIES))):
         assert cycles(values) == ASTM_CYCLES
+
+
+def test_all_channels_and_exponents_come_from_one_count_equal_to_the_package():
+    rng = np.random.default_rng(5)
+    time = np.arange(6001) / 50
+    loads = {
+        f"c{i}": 1e6 * (np.sin((1 + i) * time) + np.cumsum(rng.standard_normal(time.size)) / 50)
+        for i in range(3)
+    }
+    loads |= {"still": np.full(time.size, 3.0), "broken": np.where(time > 60, np.nan, 1.0)}
+    exponents = [3.0, 4.0, 5.0, 10.0, 12.0, 6.7]
+    found = fa.count_channels(loads, exponents, 120.0)
+    for name in ("c0", "c1", "c2"):
+        cycles = [(c[0], c[2]) for c in reference.extract_cycles(loads[name])]
+        for m in exponents:
+            by_hand = (math.fsum(n * s**m for s, n in cycles) / 120.0) ** (1 / m)
+            assert found[name].load(m) == pytest.approx(by_hand, rel=1e-12)
+        assert found[name].cycles == math.fsum(n for _, n in cycles)
+        assert found[name].largest_range == max(s for s, _ in cycles)
+    assert (
+        found["still"].condition == "constant"
+        and found["broken"].condition == "not finite from sample 3001 of 6001"
+    )
+    assert list(found) == list(loads)

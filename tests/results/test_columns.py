@@ -39,9 +39,8 @@ def test_states_loads_and_exponents_have_their_columns():
     ]
     for _, _, suffix in fatigue_keys(FATIGUE_CHANNELS, [3.0, 10.0]):
         assert {f"del_{suffix}", f"del_error_{suffix}", f"damage_ratio_{suffix}"} <= set(names)
-    assert names[-3 * len(LOAD_NAMES) :] == [
-        f"{f}_{load}" for load in LOAD_NAMES for f in ("mean", "min", "max")
-    ]
+    figures = ("mean", "min", "max", "min_time", "max_time")
+    assert names[-5 * len(LOAD_NAMES) :] == [f"{f}_{load}" for load in LOAD_NAMES for f in figures]
 
 
 def written(folder, rows):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from fatigue_runner.channels import BY_NAME
 from fatigue_runner.report.blocks import Definitions, Section
 from fatigue_runner.report.rundata import Run
+from fatigue_runner.results.life_words import place_label
 
 ORDER = 90
 
@@ -51,8 +54,54 @@ def build(run: Run) -> Section:
             "takes no part in any load.",
         ),
         ("Sampling", _sampling(run)),
+        *_life(run),
     ]
     return Section("Definitions", [Definitions([(term, meaning) for term, meaning in items if meaning])])
+
+
+def _life(run: Run) -> list[tuple[str, str]]:
+    life = run.life
+    if life is None:
+        return []
+    section = life.section
+    walls = [
+        f"{place_label(str(entry.get('place')))}: {_curve(entry.get('curve'))}, stress × {float(entry.get('stress_concentration', 1)):g} "
+        f"(concentration) × {float(entry.get('safety_factor', 1)):g} (safety)"
+        for entry in run.setting("fatigue.damage", [])
+    ]
+    found = [
+        (
+            "Lifetime DEL",
+            "(Σ pⱼ T Lⱼᵐ / N_eq)^(1/m) over the winds j: Lⱼ the short-term DEL, pⱼ the probability of its bin shared by the winds in it, "
+            f"T = {section.years:g} years of 8760 h × availability {section.availability:g} in seconds, N_eq = {section.n_eq:g}. A power "
+            "sum, never a mean of DELs. Bins from the distribution function.",
+        ),
+        (
+            "Seeds' interval",
+            f"The winds of every bin drawn anew with replacement {section.resamples} times (bootstrap, a fixed seed): "
+            f"{section.confidence:.0%} of the lives lie within it. It knows other seeds of this wind, not other models or climates.",
+        ),
+    ]
+    if walls:
+        said = (
+            "σ(a) = (Mₓ sin a − M_y cos a) / W on the section's circle, every azimuth counted by itself; Miner's sum Σ n / N(S), 1 is "
+            "failure."
+        )
+        found.append(
+            ("Damage of a section", f"{said} {'; '.join(walls)}. Sources of the curves: docs/fatigue.md.")
+        )
+    return found
+
+
+def _curve(curve: object) -> str:
+    if not isinstance(curve, Mapping):
+        return f"curve {curve}"
+    if "laminate" in curve:
+        return (
+            f"{curve['laminate']} laminate, {curve.get('tension')}/{curve.get('compression')} MPa, factors "
+            f"{curve.get('mean_factor', 1)} on the mean and {curve.get('amplitude_factor', 1)} on the amplitude"
+        )
+    return f"a curve of the campaign, m = {curve.get('exponents')} through {curve.get('stress')} MPa"
 
 
 def _counted(run: Run) -> float | None:
