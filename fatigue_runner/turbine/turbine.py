@@ -219,14 +219,19 @@ class Turbine:
         horizontal_shear: float = 0.0,
         azimuth: float = 0.0,
         pitch: float = 0.0,
+        operation: str | None = None,
     ) -> Array:
         """(size,) state of steady rotation: mean loads and the flap's swing over a revolution are balanced.
 
-        wind [m/s], shears [-], azimuth and pitch [rad].
+        wind [m/s], shears [-], azimuth and pitch [rad]; operation: another one than the turbine's, whose states it then has.
         Raises InputError where the turbine has no steady rotation at this wind and pitch.
         """
         from fatigue_runner.turbine.steady import operating_point
 
+        if operation is not None:
+            return self.operated(operation).operating_point(
+                wind, vertical_shear, horizontal_shear, azimuth, pitch
+            )
         return operating_point(self, wind, vertical_shear, horizontal_shear, azimuth, pitch)
 
     def natural_frequencies(self, wind: float, pitch: float = 0.0) -> list[tuple[str, float, float]]:

@@ -99,6 +99,14 @@ def test_steady_operation_is_openfast_s(turbine, wind):
     assert loads["tower_base_fore_aft_moment"].mean() / 1e3 == pytest.approx(tower, rel=0.03)
 
 
+def test_an_operating_point_of_another_operation_is_asked_of_the_turbine_itself(nrel5mw, turbine):
+    found = nrel5mw.operating_point(18.0, operation="controlled")
+    np.testing.assert_array_equal(found, turbine.operating_point(18.0))
+    assert len(nrel5mw.operating_point(8.0)) == nrel5mw.layout.size
+    with pytest.raises(InputError, match="unknown operation 'control'"):
+        nrel5mw.operating_point(18.0, operation="control")
+
+
 @pytest.mark.parametrize("wind", [4.0, 8.0, 11.0, 12.0, 18.0, 25.0])
 def test_a_run_that_starts_at_the_operating_point_stays_there(turbine, wind):
     run = simulate(
