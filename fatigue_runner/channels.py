@@ -5,7 +5,7 @@ Moments are about the blade-root and tower-base axes as OpenFAST's RootMyb/RootM
 
 from __future__ import annotations
 
-from fatigue_runner.layout import HARMONICS, T2B1I1CG, T2B2CG
+from fatigue_runner.layout import ACROSS, HARMONICS, T2B1I1CG, T2B2CG
 from fatigue_runner.layout import Channel as Channel
 
 STATES = T2B1I1CG.states
@@ -13,7 +13,8 @@ GROWING = tuple(
     c.name for c in STATES[T2B1I1CG.rotor : T2B1I1CG.freedoms]
 )  # azimuths, which have no extremes
 WIND_SIGNALS = T2B1I1CG.wind
-WIND_HARMONICS = HARMONICS  # what a wind of more than one harmonic has beside them
+WIND_ACROSS = ACROSS  # what a wind has beside them that does not blow straight on
+WIND_HARMONICS = HARMONICS  # and one of more than one harmonic
 
 LOADS = (
     Channel("tower_base_fore_aft_moment", "N.m", "tower-base fore-aft moment", "kN·m", 1e-3),
@@ -49,7 +50,7 @@ FATIGUE_CHANNELS = (
     "tower_base_side_side_moment",
 )
 
-BY_NAME = {c.name: c for c in (*STATES, *T2B2CG.states, *WIND_SIGNALS, *WIND_HARMONICS, *LOADS)}
+BY_NAME = {c.name: c for c in (*STATES, *T2B2CG.states, *WIND_SIGNALS, *WIND_ACROSS, *WIND_HARMONICS, *LOADS)}
 
 
 def wind_channels(columns: int) -> tuple[Channel, ...]:

@@ -9,7 +9,7 @@ A new state or signal is one entry here, or one entry of a layout that is derive
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -62,7 +62,8 @@ class FirstOrder:
 class Layout:
     """Rows of the state, of the wind and of the control signals, in this order.
 
-    harmonics: whether the wind goes on beyond `wind` with pairs of azimuthal harmonics, as many as the wind has.
+    harmonics: whether the wind goes on beyond `wind`: with that across the rotor (`ACROSS`), and with pairs of azimuthal harmonics, as
+    many as the wind has.
     Raises ValueError where the drivetrain does not end the coordinates or a blade set is not three in a row.
     """
 
@@ -180,23 +181,37 @@ class Layout:
     # --- the wind ---
 
     def wind_rows(self, signals: Iterable[Channel]) -> list[int]:
-        """Row that the kernels read each of a wind's signals from: azimuthal harmonics stand behind the layout's own.
+        """Row that the kernels read each of a wind's signals from: wind across and azimuthal harmonics stand behind the layout's own.
 
         Raises InputError for a signal that these equations do not know.
         """
-        own = {c.name: row for row, c in enumerate(self.wind)}
-        own |= {name: len(self.wind) + i for name, i in _HARMONIC_PLACES.items()}
+        own = {c.name: row for row, c in enumerate((*self.wind, *ACROSS, *HARMONICS))}
         names = [c.name for c in signals]
         if unknown := [name for name in names if name not in own]:
             raise InputError(
-                f"the wind has a signal {unknown[0]!r} that the equations do not know; they know {', '.join(c.name for c in self.wind)} "
-                "and azimuthal harmonics"
+                f"the wind has a signal {unknown[0]!r} that the equations do not know; they know "
+                f"{', '.join(c.name for c in (*self.wind, *ACROSS))} and azimuthal harmonics"
             )
         return [own[name] for name in names]
 
-    def wind_size(self, signals: Iterable[Channel]) -> int:
-        """Rows of the wind that the kernels take: the layout's own, and harmonics filled up to whole triples."""
-        return len(self.wind) + 2 * TRIPLE * triples(signals)
+    def wind_size(self, signals: Collection[Channel] = ()) -> int:
+        """Rows of the wind that the kernels take: the layout's own, wind across, and harmonics filled up to whole triples.
+
+        The layout's own alone where the wind has nothing else and the equations need not know of it.
+        """
+        names = {c.name for c in signals}
+        if not (self.harmonics or self.beyond(signals)):
+            return len(self.wind)
+        return self.first_harmonic + 2 * TRIPLE * -(-sum(c.name in names for c in HARMONICS) // (2 * TRIPLE))
+
+    def beyond(self, signals: Collection[Channel]) -> bool:
+        """Whether a wind has more than the layout's own signals: it needs the equations that take wind across and harmonics."""
+        return not {c.name for c in signals} <= {c.name for c in self.wind}
+
+    @property
+    def first_harmonic(self) -> int:
+        """Row of the first azimuthal harmonic's cosine."""
+        return len(self.wind) + len(ACROSS)
 
     # --- relative coordinates: what forces depend on, besides the azimuth ---
 
@@ -238,6 +253,12 @@ WIND = (
     Channel("horizontal_shear", "-", "linear horizontal shear", "-"),
 )
 
+# Across the nacelle's axis, mean over the rotor: y to the left of who looks downwind, z up. Of a wind that blows straight on, zero
+ACROSS = (
+    Channel("lateral_wind", "m/s", "lateral wind, mean over the rotor", "m/s"),
+    Channel("vertical_wind", "m/s", "vertical wind, mean over the rotor", "m/s"),
+)
+
 TRIPLE = 3  # azimuthal harmonics that the kernels fold at once
 MOST_HARMONICS = 16  # of any wind; six hold 98 % of every load range (docs/decisions/0011)
 
@@ -254,12 +275,6 @@ def harmonic_channels(harmonics: int) -> tuple[Channel, ...]:
 
 
 HARMONICS = harmonic_channels(MOST_HARMONICS)
-_HARMONIC_PLACES = {c.name: i for i, c in enumerate(HARMONICS)}
-
-
-def triples(signals: Iterable[Channel]) -> int:
-    """Threes of azimuthal harmonics that hold those among a wind's signals."""
-    return -(-sum(c.name in _HARMONIC_PLACES for c in signals) // (2 * TRIPLE))
 
 
 PITCH = Channel("pitch", "rad", "blade pitch", "deg", DEGREES)

@@ -15,6 +15,7 @@ class Rotor:
     weight: (r/R, density), linear between, of integral one: how much wind at each radius moves the blade's root flap moment.
     apex: of the rotor, downwind of the tower's axis [m]; tilt of the shaft [rad], negative lifts the upwind end; cone of the blades [rad],
     negative turns the tips upwind; tower: (height above ground, diameter) pairs [m], rising; none where nobody gave them.
+    yaw, upflow [rad]: how far the wind blows past the nacelle's axis, clockwise seen from above, and upwards.
     """
 
     radius: float
@@ -24,3 +25,5 @@ class Rotor:
     tilt: float = 0.0
     cone: float = 0.0
     tower: tuple[tuple[float, float], ...] = ()
+    yaw: float = 0.0
+    upflow: float = 0.0

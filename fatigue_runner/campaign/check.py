@@ -31,9 +31,15 @@ def check(resolved: Resolved) -> list[str]:
 
 def _check_logged_channels(resolved: Resolved) -> None:
     """Harmonics beyond those of the winds: the spec knows the names, only the winds how many there are."""
-    everywhere = set(channels.WIND_HARMONICS).intersection(*(wind.source.channels for wind in resolved.winds))
-    missing = {c.name for c in channels.WIND_HARMONICS if c not in everywhere}
+    some = (*channels.WIND_ACROSS, *channels.WIND_HARMONICS)
+    everywhere = set(some).intersection(*(wind.source.channels for wind in resolved.winds))
+    missing = {c.name for c in some if c not in everywhere}
     for index, name in enumerate(resolved.campaign.log.channels or ()):
+        if name in missing and channels.BY_NAME[name] in channels.WIND_ACROSS:
+            raise InputError(
+                f"{resolved.source.where(('log', 'channels', index))}: {name!r} cannot be logged, the wind blows straight on; remove it or "
+                "give the wind `yaw_misalignment` or `upflow`"
+            )
         if name in missing:
             harmonics = min(wind.source.harmonics for wind in resolved.winds)
             raise InputError(

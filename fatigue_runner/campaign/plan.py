@@ -58,7 +58,8 @@ class Plan:
                 references[case.wind.id] = case
             if store.finished(case, self.campaign.log.enabled) is None:
                 pending.setdefault(case.wind.id, []).append(case)
-        keys = [(self.winds[wind].source.cell_key, self.winds[wind].source.triples) for wind in pending]
+        layout, sources = self.resolved.turbine.layout, [self.winds[wind].source for wind in pending]
+        keys = [(source.cell_key, layout.wind_size(source.channels)) for source in sources]
         jobs = []
         for winds in blocks(list(pending), keys, BLOCK_SIZE, workers):
             needed = [references[wind] for wind in winds if wind in references]

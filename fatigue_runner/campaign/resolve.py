@@ -224,7 +224,7 @@ class _Starts:
         from fatigue_runner.integrators.initial import initial_state
 
         label = wind.label
-        key = wind.mean_speed, label.get("vertical_shear"), label.get("horizontal_shear")
+        key = wind.axial_speed, label.get("vertical_shear"), label.get("horizontal_shear")
         if key not in self._found:
             self._found[key] = initial_state(self._turbine, self._initial, wind, self._pitch)
         return self._found[key]

@@ -107,7 +107,7 @@ class Ensemble:
         """Numbers of the cases that may advance together: those whose winds share a time grid and have as many signals."""
         by_key: dict[Any, list[int]] = {}
         for i, wind in enumerate(self.winds):
-            by_key.setdefault((wind.cell_key, wind.triples), []).append(i)
+            by_key.setdefault((wind.cell_key, self.turbine.layout.wind_size(wind.channels)), []).append(i)
         return list(by_key.values())
 
 
@@ -128,7 +128,7 @@ def simulate(ensemble: Ensemble, integrator: Integrator) -> list[Trajectory]:
     out: list[Any] = [None] * len(e)
     for chosen in e.groups():
         winds = [e.winds[i] for i in chosen]
-        harmonics = winds[0].triples > 0
+        harmonics = e.turbine.layout.beyond(winds[0].channels)
         if harmonics not in blocks:
             blocks[harmonics] = make_block(
                 e.turbine, found, integrator.step, e.duration, e.output_step, e.pitch, integrator.corrector, integrator.mode, harmonics

@@ -179,7 +179,7 @@ class Turbine:
         if x.ndim not in (1, 2) or x.shape[0] != size:
             raise InputError(f"state must have shape ({size},) or ({size}, n), got {x.shape}")
         columns, angle = x.reshape(size, -1), np.asarray(pitch, float)
-        p = np.zeros((len(self.layout.wind), columns.shape[1]))
+        p = np.zeros((self.layout.wind_size(), columns.shape[1]))
         for row, signal in enumerate((wind, vertical_shear, horizontal_shear)):
             p[row] = signal
         if angle.ndim:
@@ -205,7 +205,7 @@ class Turbine:
         known = (*self.layout.wind, *HARMONICS)[: blown.shape[1]] if signals is None else signals
         rows = np.zeros((len(blown), self.layout.wind_size(known)))
         rows[:, self.layout.wind_rows(known)] = blown
-        harmonics = rows.shape[1] > len(self.layout.wind)
+        harmonics = self.layout.beyond(known)
         if self.operation != FIXED:
             angle = np.asarray(0.0)
         if angle.ndim:

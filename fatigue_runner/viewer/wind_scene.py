@@ -36,6 +36,15 @@ def wind_of_blades(case: Viewed, rows: np.ndarray) -> np.ndarray:
     return blade_wind(_signals(case, rows), case.log.state[rows, case.geometry.layout.rotor])
 
 
+def wind_across(case: Viewed, rows: np.ndarray) -> np.ndarray:
+    """(rows, 2) lateral and vertical wind over the rotor [m/s], zero where it blows straight on."""
+    out = np.zeros((len(rows), len(channels.WIND_ACROSS)))
+    for column, channel in enumerate(channels.WIND_ACROSS):
+        if channel in case.log.winds:
+            out[:, column] = case.log.wind[rows, case.log.winds.index(channel)]
+    return out
+
+
 def _signals(case: Viewed, rows: Any) -> np.ndarray:
     """(rows, 3 + 2 M) speed, shears and harmonics, without what else a wind may have."""
     felt = [c in (*channels.WIND_SIGNALS, *channels.WIND_HARMONICS) for c in case.log.winds]
@@ -75,6 +84,7 @@ def send_arrows(
     ends = case.geometry.pose(case.log.state[frames], span, scale=scale).blades[:, :, 0]
     vectors = np.zeros_like(ends)
     vectors[..., 0] = ARROW_SCALE * np.nan_to_num(wind_of_blades(case, frames))
+    vectors[..., 1:] = ARROW_SCALE * np.nan_to_num(wind_across(case, frames))[:, None]
     tails, each, time = (ends - vectors).reshape(-1, 3), [BLADES] * len(frames), case.log.time[frames]
     arrows = rr.Arrows3D.columns(origins=tails, vectors=vectors.reshape(-1, 3))
     columns(f"{root}/blade_wind", time, arrows.partition(each))

@@ -14,6 +14,7 @@ from fatigue_runner.wind.constant import ConstantWind
 from fatigue_runner.wind.from_file import read_wind_file
 from fatigue_runner.wind.full_field import FullFieldWind
 from fatigue_runner.wind.gust import GustWind
+from fatigue_runner.wind.misaligned import MisalignedWind
 from fatigue_runner.wind.series import SeriesWind
 from fatigue_runner.wind.source import SOURCES, WindSource, make_wind
 from fatigue_runner.wind.stack import stack_cells
@@ -29,6 +30,7 @@ __all__ = [
     "ConstantWind",
     "FullFieldWind",
     "GustWind",
+    "MisalignedWind",
     "SeriesWind",
     "StepWind",
     "TowerInfluence",

@@ -15,7 +15,7 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.section import Section, problem
 from fatigue_runner.inputs.source import Place
 from fatigue_runner.inputs.sweep import as_list, check_not_empty
-from fatigue_runner.layout import WIND
+from fatigue_runner.layout import ACROSS, HARMONICS, WIND, Channel, harmonic_channels
 from fatigue_runner.naming import file_id
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
@@ -92,6 +92,11 @@ class FullFieldWind(WindSource):
         return self.order
 
     @property
+    def channels(self) -> tuple[Channel, ...]:
+        across = () if self._found.harmonics.across is None else ACROSS
+        return (*WIND, *across, *harmonic_channels(self.order))
+
+    @property
     def name(self) -> str:
         return f"field-{Path(self.path).stem}"
 
@@ -126,7 +131,8 @@ class FullFieldWind(WindSource):
         if point is None:
             return ""
         variances = self._coefficients[:, 0].var(axis=0)
-        rotor, blade = variances[0] ** 0.5, (variances[0] + variances[len(WIND) :].sum() / 2) ** 0.5
+        beyond = sum(v for v, c in zip(variances, self.channels, strict=True) if c in HARMONICS)
+        rotor, blade = variances[0] ** 0.5, (variances[0] + beyond / 2) ** 0.5
         mean = self.mean_speed
         return told_strength(
             mean, point * mean, float(rotor), float(blade) if self.order > 1 else None, self.order
@@ -151,11 +157,13 @@ class FullFieldWind(WindSource):
         return on_rotor(self.path, rotor, max(self.order, 1), self.mean_wind, profile, self.box)
 
     def _samples(self) -> np.ndarray:
-        """Signals at the samples from run time 0: (n, 3 + 2 M), or (n, 3) of the plane over the disc."""
+        """Signals at the samples from run time 0, as `channels`; with M < 2 of the plane over the disc."""
         found = self._found.harmonics
-        amplitudes, disc = found.sampled(found.end)
+        amplitudes, disc, across = found.sampled(found.end)
         out = np.zeros((len(disc), self.signals))
         out[:, 0] = disc[:, 0]
+        first = len(WIND) + across.shape[1]
+        out[:, len(WIND) : first] = across
         if self.order < 2:
             out[:, 1:3] = self.order * disc[:, 1:] / disc[:, :1]
             return out
@@ -163,10 +171,10 @@ class FullFieldWind(WindSource):
         slopes = disc[:, 1:] if self._found.uniform else np.tile(disc[:, 1:].mean(axis=0), (len(disc), 1))
         mean_radius = radial_rule(self.rotor or NO_TURBINE)[2]
         out[:, 1:3] = slopes / disc[:, :1]
-        out[:, len(WIND) :] = amplitudes[:, 1:]
+        out[:, first:] = amplitudes[:, 1:]
         # kappa_h enters with -sin(psi)
-        out[:, len(WIND)] -= slopes[:, 0] * mean_radius
-        out[:, len(WIND) + 1] += slopes[:, 1] * mean_radius
+        out[:, first] -= slopes[:, 0] * mean_radius
+        out[:, first + 1] += slopes[:, 1] * mean_radius
         return out
 
     @cached_property

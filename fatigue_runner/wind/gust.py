@@ -10,9 +10,11 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from fatigue_runner.channels import wind_channels
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import known_name
 from fatigue_runner.inputs.sweep import Sweep, as_list, check_not_empty, expand
+from fatigue_runner.layout import ACROSS, WIND, Channel, harmonic_channels
 from fatigue_runner.naming import joined, speed_id
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
@@ -33,6 +35,7 @@ from fatigue_runner.wind.spectrum import TURBULENCE_CLASSES, WIND_CLASSES, wind_
 
 IEC_EXPONENT = 0.2
 FARTHEST = 85.0  # degrees that a wind may turn by: at 90 nothing of it blows along the shaft
+TOLD = 30.0  # degrees; compare `misaligned`
 CELL = 0.1  # s; every gust of the standard lasts whole tenths
 
 
@@ -42,8 +45,8 @@ class GustWind(WindSource):
 
     gust: a name of `gusts.EVENTS` (EOG, EDC+, EDC-, ECD+, ECD-, EWSV+, EWSV-, EWSH+, EWSH-); the classes say how large it is. The
     mean wind is a power law of `shear_exponent` (default 0.2) or logarithmic with a `roughness_length` [m], of which the blades
-    feel `harmonics`. EOG and ECD raise the wind all over the disc, the shear of the EWS is linear over it. Of a wind that turns the
-    blades feel the part along the shaft, its cosine; the wind across the rotor is left out, and nothing yaws.
+    feel `harmonics`. EOG and ECD raise the wind all over the disc, the shear of the EWS is linear over it. A wind that turns (EDC, ECD)
+    blows along the nacelle's axis with its cosine and across with its sine; the nacelle does not follow.
 
     Raises InputError for what is not known or not positive, for a beginning off the tenths of a second, and where the wind turns
     away from the rotor.
@@ -111,6 +114,11 @@ class GustWind(WindSource):
         return mean_profile("gust wind", self.shear_exponent, self.roughness_length) or PowerLaw(IEC_EXPONENT)
 
     @property
+    def channels(self) -> tuple[Channel, ...]:
+        across = ACROSS if self._turn else ()
+        return (*WIND, *across, *harmonic_channels(self.harmonics))
+
+    @property
     def name(self) -> str:
         return f"gust-{self.speed:g}-{self.gust}"
 
@@ -137,9 +145,9 @@ class GustWind(WindSource):
     def notes(self) -> tuple[str, ...]:
         if not self._turn:
             return ()
+        far = f", and the model's wake is made for up to {TOLD:g}" if self._turn > TOLD else ""
         return (
-            f"{self.gust} at {self.speed:g} m/s turns the wind by {self._turn:.0f} degrees: the blades feel its part along the "
-            "shaft, not the wind across the rotor, and nothing yaws.",
+            f"{self.gust} at {self.speed:g} m/s turns the wind by {self._turn:.0f} degrees; the nacelle does not follow{far}.",
         )
 
     @property
@@ -155,8 +163,13 @@ class GustWind(WindSource):
         steady = mean_signals(self.profile, self.speed, self.rotor or NO_TURBINE, self.harmonics)
         added = gust_signals(self._event, self._site, time)
         along = np.cos(added.direction)
-        out = np.multiply.outer(along, steady)
-        out[:, 0] = along * (steady[0] + added.speed)
+        speed = steady[0] + added.speed
+        places, out = {c: i for i, c in enumerate(self.channels)}, np.zeros((len(time), self.signals))
+        felt = [places[c] for c in wind_channels(len(steady))]
+        out[:, felt] = np.multiply.outer(along, steady)
+        out[:, 0] = along * speed
+        if self._turn:
+            out[:, places[ACROSS[0]]] = -np.sin(added.direction) * speed
         # shears are changes [m/s] over R; what they are divided by is the wind of the moment
         out[:, 1] = along * (steady[0] * steady[1] + added.vertical) / out[:, 0]
         out[:, 2] = along * added.horizontal / out[:, 0]

@@ -238,7 +238,7 @@ def gust_signals(gust: Gust, site: Site, time: np.ndarray, begin: float = 0.0) -
     """What a gust that begins at `begin` [s] adds to the normal wind at `time` (n,) [s].
 
     The linear shears of the campaign are the edge values over the hub-height wind: kappa = (normal + added) / v.
-    A model without yaw misalignment can only take the cosine of `direction` on the speed.
+    Of a wind that has turned, the cosine of `direction` blows along the nacelle's axis and minus its sine across (`layout.ACROSS`).
     """
     since = np.asarray(time, float) - begin
     vertical, horizontal = gust.shears(site, since).T

@@ -191,12 +191,14 @@ def tower_amplitudes(
     tilt: float = 0.0,
     cone: float = 0.0,
     profile: Profile | None = None,
+    yaw: float = 0.0,
 ) -> np.ndarray:
     """Amplitudes (1 + 2 M,) of the tower's influence on undeflected blades, over the hub-height wind.
 
     `apex_x` [m] is the rotor apex's place downwind of the tower axis (upwind rotor: negative), `tilt` and
     `cone` [rad] as OpenFAST's ShftTilt and PreCone (upwind rotor: both negative). The deficit scales with the
-    wind at the tower, so with `profile` (None: uniform). The deficit is local: cut off at M harmonics it is
+    wind at the tower, so with `profile` (None: uniform); `yaw` [rad] as in `rotor.Rotor`: the flow around the tower turns with the
+    wind. The deficit is local: cut off at M harmonics it is
     spread over about 1/M of the turn, with the right energy in each harmonic up to M.
     """
     harmonics = whole_harmonics(harmonics)
@@ -207,9 +209,11 @@ def tower_amplitudes(
     x = apex_x + axial * np.cos(tilt) - out * np.sin(tilt)
     z = hub_height + out * np.cos(tilt) + axial * np.sin(tilt)
     y = -r * np.cos(cone) * np.sin(psi)
-    local = tower_deficit(tower, x, y, z)
+    across, down = x * np.sin(yaw) + y * np.cos(yaw), x * np.cos(yaw) - y * np.sin(yaw)
+    local = tower_deficit(tower, down, across, z)
     if profile is not None:
         local = local * profile.factor(z, hub_height)
     amplitudes = analysis_rows(harmonics) @ (weight @ local)
-    amplitudes[2::2] = 0.0  # what is there is rounding
+    if not yaw:
+        amplitudes[2::2] = 0.0  # what is there is rounding
     return amplitudes

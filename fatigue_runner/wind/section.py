@@ -5,24 +5,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from pydantic import Field
+from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, known_name, problem
 from fatigue_runner.inputs.source import Place
+from fatigue_runner.inputs.sweep import Sweep, expand
 from fatigue_runner.layout import MOST_HARMONICS
+from fatigue_runner.naming import joined, value_id
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.source import WindSource, make_wind
 
 # type -> its section; filled as the modules of this folder are imported
 SECTIONS: dict[str, type[WindSection]] = {}
 DEFAULT = "constant"
+STEEPEST = 45.0  # degrees off the nacelle's axis: beyond, a rotor in operation is another flow
 # the key `harmonics` of a section: how many azimuthal ones a wind has
 Harmonics = Annotated[int, Field(ge=0, le=MOST_HARMONICS)]
 
@@ -43,7 +47,7 @@ class Realisation:
 
     parameters: of `make_wind`; path: the keys that it came from, below the section; mean_speed [m/s] where it is known before the
     wind is made; contents {parameter: hash} of files: what is in them decides the figures, not where they lie; tower: the diameters
-    of the tower in the blades' way, none where it does not count.
+    of the tower in the blades' way, none where it does not count; angles: yaw misalignment and upflow [rad].
     """
 
     id: str
@@ -53,12 +57,16 @@ class Realisation:
     mean_speed: float | None = None
     contents: tuple[tuple[str, str], ...] = ()
     tower: tuple[tuple[float, float], ...] = ()
+    angles: tuple[float, float] = (0.0, 0.0)
 
     def build(self, rotor: Rotor | None = None) -> WindSource:
         """The wind source as it blows on this rotor, or on none yet; raises InputError for parameters that it refuses."""
         wind = make_wind(self.kind, **dict(self.parameters))
         if self.tower:
             wind = make_wind("tower-influence", wind=wind)
+        if any(self.angles):
+            yaw, upflow = self.angles
+            wind = make_wind("misaligned", wind=wind, yaw_misalignment=yaw, upflow=upflow)
         return wind if rotor is None else wind.on(rotor)
 
     @property
@@ -71,19 +79,34 @@ class Realisation:
     def identity(self) -> list[Any]:
         """What decides the wind, as plain values to be hashed."""
         given = [list(pair) for pair in (dict(self.parameters) | dict(self.contents)).items()]
-        return [self.kind, given, list(self.tower)] if self.tower else [self.kind, given]
+        tower = [list(self.tower)] if self.tower else []
+        return [self.kind, given, *tower, *([list(self.angles)] if any(self.angles) else [])]
 
 
 class WindSection(Section):
     """The base of all wind sections; `kind` is what the file's `type` says.
 
-    tower_influence   whether the tower takes from the wind of the blades that pass it (default false)
+    tower_influence    whether the tower takes from the wind of the blades that pass it (default false)
+    yaw_misalignment   angle [deg] by which the wind blows past the nacelle's axis, clockwise seen from above; a sweep (default 0)
+    upflow             angle [deg] by which it blows upwards; a sweep (default 0)
     """
 
     kind: ClassVar[str]
 
     type: str = DEFAULT
     tower_influence: bool = False
+    yaw_misalignment: Sweep = Field(default=[0.0])
+    upflow: Sweep = Field(default=[0.0])
+
+    @field_validator("yaw_misalignment", "upflow")
+    @classmethod
+    def _within_reach(cls, pieces: Sweep) -> Sweep:
+        for angle, _ in expand(pieces):
+            if abs(angle) > STEEPEST:
+                raise problem(
+                    f"holds {angle:g} degrees; the model holds up to {STEEPEST:g} off the nacelle's axis"
+                )
+        return pieces
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
@@ -96,16 +119,20 @@ class WindSection(Section):
         raise NotImplementedError
 
     def winds(self, site: Site) -> Iterable[Realisation]:
-        """The realisations, with the turbine's tower in the blades' way where the section says so."""
-        if not self.tower_influence:
-            yield from self.realisations(site)
-            return
-        if not site.rotor.tower:
+        """The realisations from every direction, with the turbine's tower in the blades' way where the section says so."""
+        if self.tower_influence and not site.rotor.tower:
             raise InputError(
                 f"{site.place.where('tower_influence')}: the turbine's file has no tower diameters; add `diameters` to its `tower`"
             )
         for found in self.realisations(site):
-            yield replace(found, id=f"{found.id}_tower", tower=site.rotor.tower)
+            if self.tower_influence:
+                found = replace(found, id=f"{found.id}_tower", tower=site.rotor.tower)
+            for yaw, _ in expand(self.yaw_misalignment):
+                for up, _ in expand(self.upflow):
+                    words = (f"{word}{value_id(x)}" for word, x in (("yaw", yaw), ("up", up)) if x)
+                    yield replace(
+                        found, id=joined(found.id, *words), angles=(math.radians(yaw), math.radians(up))
+                    )
 
     def resolved(self, place: Place) -> dict[str, Any]:
         """The section as it can be read again from anywhere: as it was given, paths made absolute."""

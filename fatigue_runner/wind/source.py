@@ -34,7 +34,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.layout import WIND, Channel, harmonic_channels, triples
+from fatigue_runner.layout import WIND, Channel, harmonic_channels
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind.cells import ROUNDING, cell_count, evaluate, minimum
 from fatigue_runner.wind.checks import number
@@ -74,6 +74,11 @@ class WindSource(ABC):
         """Mean hub-height wind speed [m/s]; the speed at the start is `at(0)`."""
 
     @property
+    def axial_speed(self) -> float:
+        """Its part along the nacelle's axis [m/s], in which a run starts."""
+        return self.mean_speed
+
+    @property
     @abstractmethod
     def parameters(self) -> dict[str, Any]:
         """Plain values that describe the source, by the names of the results table where it has one."""
@@ -98,11 +103,6 @@ class WindSource(ABC):
     def signals(self) -> int:
         """Their number."""
         return len(self.channels)
-
-    @property
-    def triples(self) -> int:
-        """Harmonics among them in the kernels' threes; 0 where there are none."""
-        return triples(self.channels)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -13,17 +13,17 @@ from typing import Any, Self
 import numpy as np
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.layout import WIND
+from fatigue_runner.layout import HARMONICS, WIND, Channel, harmonic_channels
 from fatigue_runner.rotor import Rotor
+from fatigue_runner.wind.around import WindAround
 from fatigue_runner.wind.azimuthal_spectrum import DEFAULT_HARMONICS
 from fatigue_runner.wind.constant import ConstantWind
 from fatigue_runner.wind.mean_shear import checked_harmonics, radial_rule
 from fatigue_runner.wind.profiles import LinearShear, Tower, tower_amplitudes
-from fatigue_runner.wind.source import WindSource
 
 
 @dataclass(frozen=True)
-class TowerInfluence(WindSource):
+class TowerInfluence(WindAround):
     """`wind`, and what the tower takes from it where a blade passes, as potential flow; of the turbine that it blows on.
 
     order: azimuthal harmonics that hold it (None: those of the wind, or 6 where it has fewer than 2). The deficit is narrow: cut off
@@ -33,13 +33,16 @@ class TowerInfluence(WindSource):
 
     kind = "tower-influence"
 
-    wind: WindSource
     order: int | None = None
     rotor: Rotor | None = None
 
     def __post_init__(self) -> None:
         if self.order is not None and checked_harmonics("tower influence", self.order) < 2:
             raise InputError(f"tower influence: give 2 harmonics or more, got {self.order}")
+        if self.wind.kind == "misaligned":
+            raise InputError(
+                "tower influence: the wind is turned last; give MisalignedWind(TowerInfluence(wind), ...)"
+            )
         if self.rotor is not None:
             _ = self._shares
 
@@ -49,6 +52,11 @@ class TowerInfluence(WindSource):
         return cls(
             ConstantWind(8.0, 0.14), 6, Rotor(63.0, 90.0, apex=-5.0, tilt=-0.087, cone=-0.044, tower=tower)
         )
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        own = (c for c in self.wind.channels if c not in HARMONICS)
+        return (*own, *harmonic_channels(self.harmonics))
 
     def on(self, rotor: Rotor) -> Self:
         return self if self.rotor is not None else replace(self, wind=self.wind.on(rotor), rotor=rotor)
@@ -63,40 +71,12 @@ class TowerInfluence(WindSource):
         return f"{self.wind.name}-tower"
 
     @property
-    def mean_speed(self) -> float:
-        return self.wind.mean_speed
-
-    @property
     def parameters(self) -> dict[str, Any]:
         return {**self.wind.parameters, "tower_influence": True}
 
     @property
-    def label(self) -> dict[str, Any]:
-        return {**self.wind.label, "harmonics": self.harmonics, **self.parameters}
-
-    @property
     def description(self) -> str:
         return f"{self.wind.description}; the tower in the blades' way, potential flow"
-
-    @property
-    def strength(self) -> str:
-        return self.wind.strength
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return self.wind.notes
-
-    @property
-    def cell_key(self) -> float | None:
-        return self.wind.cell_key
-
-    @property
-    def length(self) -> float:
-        return self.wind.length
-
-    @property
-    def _settled(self) -> float:
-        return self.wind._settled
 
     @cached_property
     def _shares(self) -> np.ndarray:
@@ -115,15 +95,15 @@ class TowerInfluence(WindSource):
         shear = LinearShear(float(self.wind.parameters.get("vertical_shear", 0.0)), rotor.radius)
         return tower_amplitudes(
             Tower(heights, diameters), rotor.hub_height, rotor.apex, radii / np.cos(rotor.cone), shares, self.harmonics,
-            tilt=rotor.tilt, cone=rotor.cone, profile=shear,
+            tilt=rotor.tilt, cone=rotor.cone, profile=shear, yaw=rotor.yaw,
         )  # fmt: skip
 
     def _cells(self, n_cells: int) -> np.ndarray:
-        inner, shares, first = self.wind._cells(n_cells), self._shares, len(WIND)
+        inner, shares = self.wind._cells(n_cells), self._shares
         out = np.zeros((len(inner), inner.shape[1], self.signals))
         out[:, :, : inner.shape[2]] = inner
-        out[:, :, first:] += np.multiply.outer(inner[:, :, 0], shares[1:])
+        out[:, :, self.signals - 2 * self.harmonics :] += np.multiply.outer(inner[:, :, 0], shares[1:])
         # the shears [m/s] stay what they are
         out[:, :, 0] *= 1 + shares[0]
-        out[:, :, 1:first] /= 1 + shares[0]
+        out[:, :, 1 : len(WIND)] /= 1 + shares[0]
         return out

@@ -19,4 +19,6 @@ def told_strength(mean: float, point: float, rotor: float, blade: float | None, 
 def told_left_out(harmonics: int) -> str:
     """What a wind of M harmonics does not have of a real one."""
     beyond = {0: "all that differs over the rotor", 1: "all that differs over the rotor beyond linear shears"}
-    return f"lateral and vertical wind; {beyond.get(harmonics, f'azimuthal harmonics above {harmonics}')}"
+    return (
+        f"lateral and vertical turbulence; {beyond.get(harmonics, f'azimuthal harmonics above {harmonics}')}"
+    )

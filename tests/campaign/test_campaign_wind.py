@@ -46,13 +46,13 @@ def test_logs_with_harmonics_are_evaluated_again_to_the_bits_of_a_fresh_run(tmp_
         )
         resumed = run_campaign(AGAIN, tmp_path / "resumed")
     assert resumed.simulated == 4 and figures(resumed) == figures(fresh)
-    wind = TurbulentWind(8.0, 0.14, seed=1, duration=6.0).on(load_turbine("nrel5mw").rotor)
     for case_id in fresh.column("case_id"):
         ours, theirs = (read_log(tmp_path / run / "logs" / f"{case_id}.mcap") for run in ("resumed", "fresh"))
         assert ours.wind.shape == (301, 15) and ours.wind.tobytes() == theirs.wind.tobytes()
         assert ours.state.tobytes() == theirs.state.tobytes()
     (first,) = fresh.where(method="rk4", wind_speed=8.0)
     log = read_log(tmp_path / "fresh" / "logs" / f"{first['case_id']}.mcap")
+    wind = TurbulentWind(8.0, 0.14, seed=first["seed"], duration=6.0).on(load_turbine("nrel5mw").rotor)
     assert np.array_equal(log.wind, wind.at(log.time))
 
 
@@ -67,7 +67,7 @@ def test_table_and_log_say_how_strong_the_wind_is_at_a_point_and_over_the_rotor(
         assert log.run["harmonics"] == "6" and float(log.result["rotor_intensity"]) == row["rotor_intensity"]
         assert log.run["wind_description"].startswith("IEC 61400-1 turbulence, Kaimal spectrum")
         assert "m/s (14.0\u00a0% of the mean) at a point" in log.run["wind_strength"]
-        assert log.run["wind_left_out"] == "lateral and vertical wind; azimuthal harmonics above 6"
+        assert log.run["wind_left_out"] == "lateral and vertical turbulence; azimuthal harmonics above 6"
 
 
 def test_a_wind_from_a_file_is_in_the_table_by_the_file_s_name_and_notes_are_told_once(tmp_path):

@@ -159,7 +159,7 @@ def test_info_says_how_strong_the_wind_is_where_and_shows_its_amplitudes_when_al
     run = RUN | {
         "step": "0.1", "turbine": "nrel5mw", "wind_source": "turbulent", "turbulence_intensity": "0.14", "harmonics": "2",
         "wind_strength": "standard deviation 1.12 m/s at a point; the mean over the rotor keeps 0.62 m/s",
-        "wind_left_out": "lateral and vertical wind; azimuthal harmonics above 2",
+        "wind_left_out": "lateral and vertical turbulence; azimuthal harmonics above 2",
     }  # fmt: skip
     path = write_log(tmp_path / "a.mcap", with_harmonics(2), run)
     text = CliRunner().invoke(app, ["info", str(path)]).output

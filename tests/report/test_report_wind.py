@@ -13,7 +13,7 @@ from fatigue_runner.report.sections.wind import MOST, build
 
 WORDS = {
     "descriptions": ["IEC 61400-1 turbulence of class B"],
-    "left_out": ["lateral and vertical wind; azimuthal harmonics above 6"],
+    "left_out": ["lateral and vertical turbulence; azimuthal harmonics above 6"],
     "notes": ["a.bts: points every 25 m hold azimuthal harmonics up to 5."],
 }
 
@@ -50,7 +50,7 @@ def test_both_numbers_stand_beside_each_other_for_every_mean_speed(tmp_path):
     assert "that of a point at the hub" in table.caption
     assert said.text == (
         "IEC 61400-1 turbulence of class B. Each blade feels, at its own azimuth, 6 azimuthal harmonics of what differs over the rotor. "
-        "Left out: lateral and vertical wind; azimuthal harmonics above 6."
+        "Left out: lateral and vertical turbulence; azimuthal harmonics above 6."
     )
     assert notes.items == WORDS["notes"]
 

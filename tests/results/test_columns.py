@@ -26,7 +26,8 @@ def test_every_column_has_a_name_of_its_own_a_meaning_and_a_unit_where_it_is_a_n
 def test_the_identities_are_parts_of_the_table():
     assert (
         *("wind_source", "wind_speed", "vertical_shear", "horizontal_shear", "shear_exponent"),
-        *("roughness_length", "turbulence_intensity", "harmonics", "seed", "gust", "wind_file"),
+        *("roughness_length", "turbulence_intensity", "harmonics", "yaw_misalignment_deg", "upflow_deg"),
+        *("tower_influence", "seed", "gust", "wind_file"),
     ) == WIND
     assert INTEGRATOR == ("method", "step", "corrector", "mode", "is_reference")
     assert (*WIND, "operation", "pitch_deg", *INTEGRATOR) == DESCRIPTION

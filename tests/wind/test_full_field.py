@@ -15,7 +15,7 @@ from fatigue_runner.rotor import Rotor
 from fatigue_runner.wind import FullFieldWind, make_wind
 from fatigue_runner.wind.fields import read_wind
 from fatigue_runner.wind.mean_shear import mean_signals
-from fatigue_runner.wind.profiles import Logarithmic, PowerLaw
+from fatigue_runner.wind.profiles import Logarithmic, PowerLaw, profile_disc_fit
 
 ROTOR = Rotor(20.0, 50.0)
 WIDE = {"spacing": (10.0, 10.0), "mean": 9.0, "hub": 50.0}
@@ -125,11 +125,26 @@ def test_a_step_in_uniform_wind_is_not_overshot(tmp_path):
     assert wind.at(np.arange(0, 60, 0.005))[:, 0].min() == pytest.approx(0.5) and wind.lowest_speed[0] > 0.49
 
 
-def test_wind_across_the_shaft_is_told_to_be_left_out(tmp_path):
-    wind = FullFieldWind(uniform(tmp_path / "a.hh", "0 10 30 0 0 0 0 0", "9 10 30 0 0 0 0 0"))
+def test_uniform_wind_from_aside_and_from_below_blows_across_as_inflowwind_has_it(tmp_path):
+    """UniformField_GetVel of OpenFAST's IfW_FlowField: first the upflow, then the direction."""
+    row = "10 20 2 0 0.2 0 0.5 5"  # speed, direction, vertical, two shears around an exponent, gust, upflow
+    wind = FullFieldWind(uniform(tmp_path / "a.hh", f"0 {row}", f"9 {row}"), harmonics=2).on(ROTOR)
+    (signals,) = wind.at([5.0])
+    assert [c.name for c in wind.channels[3:5]] == ["lateral_wind", "vertical_wind"]
+    turned, up = np.radians(20), np.radians(5)
+    whole = 0.5 + 10 * profile_disc_fit(PowerLaw(0.2), ROTOR.hub_height, ROTOR.radius)[0]
+    level = np.cos(up) * whole - np.sin(up) * 2
+    expected = level * np.cos(turned), -level * np.sin(turned), np.sin(up) * whole + np.cos(up) * 2
+    assert signals[[0, 3, 4]] == pytest.approx(expected, rel=1e-9)
+    assert wind.notes == ()
+
+
+def test_a_uniform_wind_that_turns_far_is_told_and_one_straight_on_has_no_wind_across(tmp_path):
+    wind = FullFieldWind(uniform(tmp_path / "a.hh", "0 10 0 0 0 0 0 0", "9 10 40 0 0 0 0 0"))
     (note,) = wind.on(ROTOR).notes
-    assert "up to 5 m/s of wind across the shaft" in note and "along it only" in note
-    assert wind.on(ROTOR).at([5.0])[0, 0] == pytest.approx(10 * np.cos(np.pi / 6))
+    assert "turns the wind by up to 40 degrees" in note and "does not follow" in note
+    straight = FullFieldWind(uniform(tmp_path / "b.hh", "0 10 0 0 0 0 0 0", "9 10 0 0 0 0 0 0")).on(ROTOR)
+    assert "lateral_wind" not in [c.name for c in straight.channels]
 
 
 def test_a_file_that_was_made_anew_is_read_anew_and_hashed_with_what_lies_beside_it(tmp_path):

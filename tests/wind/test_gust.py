@@ -12,6 +12,7 @@ from fatigue_runner.campaign.resolve import resolve
 from fatigue_runner.campaign.spec import parse_campaign
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.source import Source
+from fatigue_runner.layout import ACROSS
 from fatigue_runner.rotor import Rotor
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.wind import ConstantWind, GustWind
@@ -30,11 +31,16 @@ def resolved(duration=60, **wind):
     return resolve(parse_campaign(source), source).winds
 
 
+def straight(wind, time):
+    """The signals without those across the nacelle's axis, which only a wind that turns has."""
+    return wind.at(time)[:, [c not in ACROSS for c in wind.channels]]
+
+
 @pytest.mark.parametrize("name", EVENTS)
 def test_before_the_gust_the_wind_is_steady_and_after_it_holds_on(name):
     wind = GustWind(12.0, name, begin=5.0).on(ROTOR)
     steady = ConstantWind(12.0, shear_exponent=0.2).on(ROTOR).at([0.0])[0]
-    assert wind.at([0.0, 4.999]) == pytest.approx(np.tile(steady, (2, 1)), rel=1e-12)
+    assert straight(wind, [0.0, 4.999]) == pytest.approx(np.tile(steady, (2, 1)), rel=1e-12)
     end = 5.0 + EVENTS[name].duration
     assert wind.at([end, end + 100.0])[0] == pytest.approx(wind.at([end + 100.0])[0], rel=1e-12)
     if name[:3] in ("EOG", "EWS"):  # what comes goes
@@ -54,7 +60,10 @@ def test_the_rotor_has_the_winds_of_the_formulas_between_the_cells_too(name):
     # shears and harmonics keep their winds [m/s]
     assert found[:, 1] * speed == pytest.approx(along * (steady[0] * steady[1] + added.vertical), abs=5e-5)
     assert found[:, 2] * speed == pytest.approx(along * added.horizontal, abs=5e-5)
-    assert found[:, 3:] == pytest.approx(np.multiply.outer(along, steady[3:]), abs=1e-6)
+    assert straight(wind, time)[:, 3:] == pytest.approx(np.multiply.outer(along, steady[3:]), abs=1e-6)
+    if wind._turn:
+        across = -np.sin(added.direction) * (steady[0] + added.speed)
+        assert found[:, 3] == pytest.approx(across, abs=2e-5) and not found[:, 4].any()
 
 
 def test_signs_turn_shears_and_directions_round():
@@ -63,12 +72,28 @@ def test_signs_turn_shears_and_directions_round():
 
     assert middle("EWSV+")[1] > 0.2 > 0.0 > middle("EWSV-")[1]
     assert middle("EWSH+")[2] == pytest.approx(-middle("EWSH-")[2]) and middle("EWSH+")[2] > 0.1
-    assert middle("EDC+") == pytest.approx(middle("EDC-"))  # a cosine has no sign
+    right, left = middle("EDC+"), middle("EDC-")
+    assert (
+        right[3] == pytest.approx(-left[3]) and right[3] < -3.0
+    )  # positive: to the right of who looks downwind
+    assert np.delete(right, 3) == pytest.approx(np.delete(left, 3))
 
 
-def test_a_gust_that_turns_the_wind_says_what_is_left_out_and_one_that_turns_it_away_is_refused():
+@pytest.mark.parametrize("name", ["EDC+", "ECD-"])
+def test_a_wind_that_turns_keeps_its_speed_over_the_disc(name):
+    wind = GustWind(12.0, name, begin=1.0).on(ROTOR)
+    assert [c.name for c in wind.channels[3:5]] == ["lateral_wind", "vertical_wind"]
+    (before,), (after,) = wind.at([0.5]), wind.at([20.0])
+    added = 15.0 if name == "ECD-" else 0.0
+    assert np.hypot(after[0], after[3]) == pytest.approx(before[0] + added, rel=1e-9)
+    turned = np.degrees(np.arctan2(-after[3], after[0]))
+    assert turned == pytest.approx(-60.0 if name == "ECD-" else wind._turn)
+    assert before[3] == 0.0 and not wind.at([20.0])[0, 4]
+
+
+def test_a_gust_that_turns_the_wind_is_told_and_one_that_turns_it_away_is_refused():
     (note,) = GustWind(12.0, "ECD+").on(ROTOR).notes
-    assert "turns the wind by 60 degrees" in note and "not the wind across the rotor" in note
+    assert "turns the wind by 60 degrees; the nacelle does not follow" in note and "up to 30" in note
     assert GustWind(12.0, "EOG").on(ROTOR).notes == ()
     with pytest.raises(
         InputError, match=r"ECD- at 8 m/s turns the wind by 90 degrees, away from the rotor.*; take"

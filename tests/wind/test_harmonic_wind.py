@@ -9,12 +9,14 @@ import pytest
 from field_files import some_field, write_bts
 from simulating import simulate_block
 
+from fatigue_runner.channels import wind_channels
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import Ensemble, Integrator, refuse_unresolved, simulate
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.aerodynamics import LOAD_NAMES, rotor_loads
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.lanes import evaluate
+from fatigue_runner.turbine.model import HARMONIC
 from fatigue_runner.turbine.table_builder import turbine_blade
 from fatigue_runner.wind import ConstantWind, FullFieldWind, TurbulentWind
 from fatigue_runner.wind.azimuth import wind_at
@@ -29,8 +31,9 @@ def turbine():
 
 def folded(turbine, state, signals):
     """State derivatives under any wind signals (n, 3 or more)."""
-    padded = np.zeros((3 + 6 * -(-(signals.shape[1] - 3) // 6), len(signals)))
-    padded[: signals.shape[1]] = signals.T
+    known = wind_channels(signals.shape[1])
+    padded = np.zeros((HARMONIC.layout.wind_size(known), len(signals)))
+    padded[HARMONIC.layout.wind_rows(known)] = signals.T
     return evaluate(turbine.kernel_data(0.0, True), state, padded)[0]
 
 

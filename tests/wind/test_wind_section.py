@@ -75,8 +75,8 @@ def test_a_new_source_reaches_a_campaign_without_an_edit_elsewhere(doubled):
     found = resolve(campaign, source).winds
     assert [wind.named.id for wind in found] == ["v06.00_doubled", "v08.00_doubled"]
     assert [wind.source.mean_speed for wind in found] == [6.0, 8.0]
-    said = {"type": "doubled", "tower_influence": False, "halves": [3.0, 4.0], "veer": 0.0}
-    assert campaign.model_dump()["wind"] == said
+    every = {"type": "doubled", "tower_influence": False, "yaw_misalignment": [0.0], "upflow": [0.0]}
+    assert campaign.model_dump()["wind"] == {**every, "halves": [3.0, 4.0], "veer": 0.0}
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def _slope(model: Any, t: float, x: Array, signals: Any, state: Array, slope: Ar
 
 def of_one_case(turbine: Any, wind: Any, duration: float, pitch: float) -> Callable[[float, Array], Array]:
     """f(t, x) of one case for `duration` [s] at a pitch [rad], compiled; the lanes beside it are wasted."""
-    data = turbine.kernel_data(pitch, harmonics=wind.triples > 0)
+    data = turbine.kernel_data(pitch, harmonics=turbine.layout.beyond(wind.channels))
     layout = data.model.layout
     cell_duration, cells = stack_cells([wind], duration, layout)
     block = to_groups(np.ascontiguousarray(cells.reshape(-1, 1))).reshape(len(cells), 4, -1)

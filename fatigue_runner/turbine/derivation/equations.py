@@ -155,6 +155,7 @@ class States:
 
 T2B1I1CG, T2B2CG = States(("e",)), States(("e1", "e2", "e3"))
 WIND = sp.symbols("v kv kh", real=True)
+ACROSS = sp.symbols("v_lateral v_vertical", real=True)  # of winds that may have it: see `inflow`
 # what the wind's azimuthal harmonics add at the blades, uniform along them: mean + cos cos(alpha_i) + sin sin(alpha_i)
 FOLDED = sp.symbols("w_fold_mean w_fold_cos w_fold_sin", real=True)
 SINE, COSINE = sp.symbols("sin_phi cos_phi", real=True)
@@ -905,14 +906,16 @@ class Aerodynamics:
 
 
 def inflow(sheet: Sheet, m: Motion, harmonics: bool) -> Aerodynamics:
-    """Relative wind at the hub, in F, and the tip-speed ratio of the look-up; harmonics: whether blades feel azimuthal ones.
+    """Relative wind at the hub, in F, and the tip-speed ratio of the look-up; harmonics: whether the wind may blow across, too, and blades
+    feel azimuthal ones.
 
     Of the harmonics' wind, the part along the shaft acts on the blades; across the rotor it would be a few per cent of a fluctuation.
     """
     v, kv, kh = WIND
+    blowing = [v, *ACROSS] if harmonics else [v, 0, 0]
     ad, sd = tower(sheet, 1)
     cos_a, sin_a, cos_r, sin_r = sp.symbols("pitch_cos pitch_sin roll_cos roll_sin", real=True)
-    wind_n = rot_x_t(cos_r, sin_r, rot_y_t(cos_a, sin_a, [v, 0, 0]))
+    wind_n = rot_x_t(cos_r, sin_r, rot_y_t(cos_a, sin_a, blowing))
     wind_s = to_shaft(sheet, "wind_s", sheet.let_vector("wind_n", wind_n))
     wind = rot_x_t(COSINE, SINE, wind_s)
     relative = sheet.let_vector("relative", wind - m.t_a * ad - m.t_s * sd)

@@ -97,7 +97,7 @@ class Variant:
             ("x", self.layout.states), ("wind", self.layout.wind), ("control", self.layout.control),
         ):  # fmt: skip
             out |= {symbols[signal.name]: f"{array}[{i}]" for i, signal in enumerate(signals)}
-        return out
+        return out | {s: f"wind[{len(self.layout.wind) + i}]" for i, s in enumerate(eq.ACROSS)}
 
 
 class Printer(PythonCodePrinter):
@@ -228,7 +228,7 @@ def kernel(
 
     if variant.layout.harmonics:
         source.append(
-            f"{', '.join(map(str, eq.FOLDED))} = harmonics(wind, {len(variant.layout.wind)}, cos_phi, sin_phi)"
+            f"{', '.join(map(str, eq.FOLDED))} = harmonics(wind, {variant.layout.first_harmonic}, cos_phi, sin_phi)"
         )
 
     def write(target: str, expr: sp.Expr) -> None:
@@ -311,7 +311,7 @@ def module(variant: Variant) -> str:
     }
     tables = variant.tables[: variant.equation_tables]
     sizes = (
-        f"({layout.size}, LANES), wind ({len(layout.wind)}, LANES), control ({len(layout.control)}, LANES)"
+        f"({layout.size}, LANES), wind ({layout.wind_size()}, LANES), control ({len(layout.control)}, LANES)"
     )
     kernels = [
         kernel("rhs", f"State derivative of LANES cases: x, out[start:] in blocks {sizes}.",

@@ -443,7 +443,7 @@ double = 2.0 * sine * cosine
 half = 1.0 - 2.0 * sine * sine
 sin_phi = 2.0 * double * half
 cos_phi = 1.0 - 2.0 * double * double
-w_fold_mean, w_fold_cos, w_fold_sin = harmonics(wind, 3, cos_phi, sin_phi)
+w_fold_mean, w_fold_cos, w_fold_sin = harmonics(wind, 5, cos_phi, sin_phi)
 a = x[0]
 t_slope_fa = constants[66]
 pitch_angle = a*t_slope_fa
@@ -535,10 +535,12 @@ acc_f_z = acc_f_s_z*cos_phi - apex_acc_y*sin_phi
 spin_h_y = spin_f_y + phid*won_z
 spin_h_z = spin_f_z - phid*won_y
 v = wind[0]
-wind_n_x = pitch_cos*v
-u13 = pitch_sin*v
-wind_n_y = roll_sin*u13
-wind_n_z = roll_cos*u13
+v_vertical = wind[4]
+wind_n_x = pitch_cos*v - pitch_sin*v_vertical
+u13 = pitch_cos*v_vertical + pitch_sin*v
+v_lateral = wind[3]
+wind_n_y = roll_cos*v_lateral + roll_sin*u13
+wind_n_z = roll_cos*u13 - roll_sin*v_lateral
 wind_s_x = cos_tilt*wind_n_x + sin_tilt*wind_n_z
 wind_s_z = cos_tilt*wind_n_z - sin_tilt*wind_n_x
 relative_x = wind_s_x - ad*tha_s_x - sd*ths_s_x
@@ -1168,7 +1170,7 @@ _rhs: Any = lane_kernel(RHS_CODE, ('x', 'wind', 'control', 'out'), LANES)
 
 @njit(**INLINE)
 def rhs(x, wind, control, out, start, tables, cells, constants, clamped):
-    """State derivative of LANES cases: x, out[start:] in blocks (20, LANES), wind (3, LANES), control (0, LANES)."""
+    """State derivative of LANES cases: x, out[start:] in blocks (20, LANES), wind (5, LANES), control (0, LANES)."""
     _rhs(x, wind, control, out, start, tables, cells, constants, clamped)
 
 
@@ -1183,7 +1185,7 @@ double = 2.0 * sine * cosine
 half = 1.0 - 2.0 * sine * sine
 sin_phi = 2.0 * double * half
 cos_phi = 1.0 - 2.0 * double * double
-w_fold_mean, w_fold_cos, w_fold_sin = harmonics(wind, 3, cos_phi, sin_phi)
+w_fold_mean, w_fold_cos, w_fold_sin = harmonics(wind, 5, cos_phi, sin_phi)
 f1d = x[12]
 f2d = x[13]
 f3d = x[14]
@@ -1283,10 +1285,12 @@ acc_f_z = acc_f_s_z*cos_phi - apex_acc_y*sin_phi
 spin_h_y = spin_f_y + phid*won_z
 spin_h_z = spin_f_z - phid*won_y
 v = wind[0]
-wind_n_x = pitch_cos*v
-u13 = pitch_sin*v
-wind_n_y = roll_sin*u13
-wind_n_z = roll_cos*u13
+v_vertical = wind[4]
+wind_n_x = pitch_cos*v - pitch_sin*v_vertical
+u13 = pitch_cos*v_vertical + pitch_sin*v
+v_lateral = wind[3]
+wind_n_y = roll_cos*v_lateral + roll_sin*u13
+wind_n_z = roll_cos*u13 - roll_sin*v_lateral
 wind_s_x = cos_tilt*wind_n_x + sin_tilt*wind_n_z
 wind_s_z = cos_tilt*wind_n_z - sin_tilt*wind_n_x
 relative_x = wind_s_x - ad*tha_s_x - sd*ths_s_x
@@ -1725,5 +1729,5 @@ _loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'derivative', 'ou
 
 @njit(**INLINE)
 def loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped):
-    """Load channels of LANES states: x, derivative (20, LANES), wind (3, LANES), control (0, LANES), out (k, LANES)."""
+    """Load channels of LANES states: x, derivative (20, LANES), wind (5, LANES), control (0, LANES), out (k, LANES)."""
     _loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped)

@@ -92,7 +92,9 @@ def _on_rotor(
     if isinstance(found, UniformWind):
         until = float(found.time[-1]) + 2 * found.time_step
         return FileWind(harmonics_of_uniform(found, *at, duration=until, x=rotor.apex), True)
-    return FileWind(harmonics_of(found, *at, x=rotor.apex, tilt=rotor.tilt), False)
+    return FileWind(
+        harmonics_of(found, *at, x=rotor.apex, tilt=rotor.tilt, yaw=rotor.yaw, upflow=rotor.upflow), False
+    )
 
 
 def _mann_box(

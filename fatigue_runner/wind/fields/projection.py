@@ -27,6 +27,7 @@ from fatigue_runner.wind.azimuth import (
     whole_harmonics,
 )
 from fatigue_runner.wind.checks import number
+from fatigue_runner.wind.direction import directions
 from fatigue_runner.wind.fields.field import WindField
 from fatigue_runner.wind.profiles import profile_amplitudes, profile_disc_fit
 
@@ -38,7 +39,8 @@ class FieldHarmonics:
     amplitudes (n, 1 + 2 M) [m/s] in the order c_0, c_1, s_1, ... of `wind.azimuth`: what the blades see.
     disc (n, 3) [m/s]: area-weighted mean v and slopes G_z, G_y per rotor radius of the least-squares plane, so
     that the linear shears are G_z / v and G_y / v: what the tip-speed ratio is made of. `mean_speed` [m/s] as
-    the file says it; hub_intensity: standard deviation over mean at the hub's point, None for a wind without points.
+    the file says it; hub_intensity: standard deviation over mean at the hub's point, None for a wind without points. across (n, 2):
+    lateral and vertical wind, mean over the disc [m/s]; None where the file has none.
     """
 
     time_step: float
@@ -50,6 +52,7 @@ class FieldHarmonics:
     periodic: bool = False
     notes: tuple[str, ...] = field(default=())
     hub_intensity: float | None = None
+    across: np.ndarray | None = None
 
     @property
     def end(self) -> float:
@@ -58,8 +61,8 @@ class FieldHarmonics:
             return len(self.amplitudes) * self.time_step
         return self.start + (len(self.amplitudes) - 1) * self.time_step
 
-    def sampled(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes and disc at run times 0, time_step, 2 time_step, ... up to at least `duration` [s].
+    def sampled(self, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Amplitudes, disc and what blows across (n, 0 or 2) at run times 0, time_step, 2 time_step, ... up to at least `duration` [s].
 
         A cubic spline through the field's own samples (a periodic one where it is periodic); linear interpolation,
         as OpenFAST's, halves the amplitudes at a third of the sampling rate midway between samples. The last
@@ -73,15 +76,49 @@ class FieldHarmonics:
                 f"{self.source}: the field passes the rotor from {self.start:.6g} to {self.end:.6g} s of the run, "
                 f"which needs 0 to {duration:g} s; make the field longer or the run shorter"
             )
-        samples = np.concatenate([self.amplitudes, self.disc], axis=1)
+        across = np.zeros((len(self.disc), 0)) if self.across is None else self.across
+        samples = np.concatenate([self.amplitudes, self.disc, across], axis=1)
         own = self.start + self.time_step * np.arange(len(samples) + self.periodic)
         if self.periodic:
             samples = np.concatenate([samples, samples[:1]])
         time = self.time_step * np.arange(math.ceil(duration / self.time_step - 1e-9) + 1)
         ends = "periodic" if self.periodic else "not-a-knot"
         values = CubicSpline(own, samples, bc_type=ends)(time if self.periodic else np.minimum(time, own[-1]))
-        width = self.amplitudes.shape[1]
-        return values[:, :width], values[:, width:]
+        width, rest = self.amplitudes.shape[1], across.shape[1]
+        return (
+            values[:, :width],
+            values[:, width : values.shape[1] - rest],
+            values[:, values.shape[1] - rest :],
+        )
+
+
+@dataclass(frozen=True)
+class RotorPlane:
+    """The plane of the rotor, its apex at `x` downwind of the tower (an upwind rotor with an overhang of 5 m: -5) and `hub_height` [m].
+
+    It leans by `tilt` [rad] (OpenFAST's ShftTilt, negative for an upwind rotor: the top is farther downwind); the field blows past the
+    nacelle's axis by `yaw` and `upflow` [rad] (`wind.direction`), turned about the tower at hub height as OpenFAST turns it.
+    """
+
+    hub_height: float
+    x: float = 0.0
+    tilt: float = 0.0
+    yaw: float = 0.0
+    upflow: float = 0.0
+
+    def places(self, across: np.ndarray, above: np.ndarray) -> np.ndarray:
+        """(3, n): x, y and height in the field [m] of points to the left and above the apex (n,) [m]."""
+        points = np.stack([self.x - np.tan(self.tilt) * above, across, above])
+        along, left, height = directions(self.yaw, self.upflow) @ points
+        return np.stack([along, left, self.hub_height + height])
+
+    def behind(self, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """(ny, nz): how far [m] downwind of `x` the plane lies at the lines of a field's grid."""
+        # the plane is flat in the field, too: three of its points say how it leans
+        (x0, y0, z0), *others = self.places(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])).T
+        sides = np.array(others) - (x0, y0, z0)
+        slopes = np.linalg.solve(sides[:, 1:], sides[:, 0])
+        return x0 - self.x + slopes[0] * (y[:, None] - y0) + slopes[1] * (z[None] - z0)
 
 
 def harmonics_of(
@@ -94,21 +131,22 @@ def harmonics_of(
     *,
     x: float = 0.0,
     tilt: float = 0.0,
+    yaw: float = 0.0,
+    upflow: float = 0.0,
 ) -> FieldHarmonics:
     """The field's azimuthal amplitudes on the rotor in time, M = `harmonics`; lengths in m.
 
-    radii, weight (k,): the share of each radius as in `radial_shares`. The rotor plane lies at `x` (downwind of
-    the tower positive: for an upwind rotor with the overhang of -5 m, x = -5) and leans by `tilt` [rad]
-    (OpenFAST's ShftTilt, negative for an upwind rotor: the top is farther downwind). Raises InputError for a
-    grid that does not cover the rotor or belongs to another hub, and for weights and M out of bounds.
+    radii, weight (k,): the share of each radius as in `radial_shares`. The rotor plane stands in the field as `RotorPlane` says.
+    Raises InputError for a grid that does not cover the rotor or belongs to another hub, and for weights and M out of bounds.
     """
     harmonics = whole_harmonics(harmonics)
     radii, weight = radial_shares(radii, weight, rotor_radius)
     wind_field.refuse_rotor(hub_height, rotor_radius)
-    lead = np.tan(tilt) * (wind_field.z - hub_height) / wind_field.mean_speed / wind_field.time_step
+    plane = RotorPlane(hub_height, x, tilt, yaw, upflow)
+    lead = -plane.behind(wind_field.y, wind_field.z) / wind_field.mean_speed / wind_field.time_step
     u, first = _leaning(wind_field.u - _profile_on_grid(wind_field), lead, wind_field.periodic)
     rotor = hub_height, rotor_radius, radii, weight, harmonics
-    matrix = projection_matrix(wind_field.y, wind_field.z, *rotor)
+    matrix = projection_matrix(wind_field.y, wind_field.z, plane, *rotor[1:])
     values = u.reshape(len(u), -1) @ matrix.T.astype(np.float32)
     values = values.astype(float) + _profile_on_rotor(wind_field, *rotor)
     start = first * wind_field.time_step - wind_field.delay(x)
@@ -166,7 +204,7 @@ def _coarse(wind_field: WindField, radii: np.ndarray, weight: np.ndarray, harmon
 
 
 def _leaning(u: np.ndarray, lead: np.ndarray, periodic: bool) -> tuple[np.ndarray, float]:
-    """The field on a leaning plane: row k of heights is taken lead[k] samples later; (field, first sample).
+    """The field on a leaning plane: what point (j, k) has lead[j, k] samples later; (field, first sample).
 
     Linear in time between samples, as OpenFAST reads them. Without a period both ends get shorter.
     """
@@ -178,17 +216,21 @@ def _leaning(u: np.ndarray, lead: np.ndarray, periodic: bool) -> tuple[np.ndarra
     if last - first < 2:
         return u[:0], 0.0
     out = np.empty((last - first, *u.shape[1:]), np.float32)
-    for k, (shift, part) in enumerate(zip(whole, lead - whole, strict=True)):
-        index = np.arange(first + shift, last + shift + 1)
-        row = u[index % nt, :, k] if periodic else u[index[0] : index[-1] + 1, :, k]
-        out[:, :, k] = row[:-1] + np.float32(part) * (row[1:] - row[:-1])
+    # a rotor that is not turned has the same lead all along a row of the grid, which is faster as a whole
+    columns = [slice(None)] if (lead == lead[:1]).all() else [slice(j, j + 1) for j in range(len(lead))]
+    for j in columns:
+        for k in range(lead.shape[1]):
+            shift, part = whole[j, k][0], np.float32((lead - whole)[j, k][0])
+            index = np.arange(first + shift, last + shift + 1)
+            row = u[index % nt, j, k] if periodic else u[index[0] : index[-1] + 1, j, k]
+            out[:, j, k] = row[:-1] + part * (row[1:] - row[:-1])
     return out, float(first)
 
 
 def projection_matrix(
     y: np.ndarray,
     z: np.ndarray,
-    hub_height: float,
+    plane: RotorPlane,
     rotor_radius: float,
     radii: np.ndarray,
     weight: np.ndarray,
@@ -199,22 +241,23 @@ def projection_matrix(
     rows = analysis_rows(max(harmonics, 1))
     matrix = np.zeros((4 + 2 * harmonics, len(y) * len(z)))
     for radius, share in zip(radii, weight, strict=True):
-        circle = _circle(y, z, hub_height, radius)
+        circle = _circle(y, z, plane, radius)
         matrix[: 1 + 2 * harmonics] += share * _spread(circle, rows[: 1 + 2 * harmonics], matrix.shape[1])
     shares = np.stack([mean, slope, -slope], axis=1)
     for fraction, share in zip(rho, shares, strict=True):
-        circle = _circle(y, z, hub_height, fraction * rotor_radius)
+        circle = _circle(y, z, plane, fraction * rotor_radius)
         matrix[1 + 2 * harmonics :] += share[:, None] * _spread(circle, rows[:3], matrix.shape[1])
     return matrix
 
 
 def _circle(
-    y: np.ndarray, z: np.ndarray, hub_height: float, radius: float
+    y: np.ndarray, z: np.ndarray, plane: RotorPlane, radius: float
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Grid points and their shares in the wind at the azimuths of a circle: four corners, (AZIMUTHS,) each."""
     psi = azimuth_grid()
-    j, b = _between(y, -radius * np.sin(psi))
-    k, c = _between(z, hub_height + radius * np.cos(psi))
+    _, across, height = plane.places(-radius * np.sin(psi), radius * np.cos(psi))
+    j, b = _between(y, across)
+    k, c = _between(z, height)
     place = j * len(z) + k
     return [
         (place, (1 - b) * (1 - c)),

@@ -41,6 +41,7 @@ COLUMNS = (
     "upflow",
 )
 WITHOUT_UPFLOW = 8
+TURNED = 30.0  # degrees; beyond, the wake's lean is extrapolated
 STEP = 0.05  # s, where the file's own times are not uniform or far apart: between them its wind is linear
 
 
@@ -115,12 +116,9 @@ def read_uniform(path: str | Path, reference_height: float, reference_length: fl
     notes = []
     if table[0, 0] > 0:
         notes.append(f"{path} begins at {table[0, 0]:g} s; until then its first line holds.")
-    speed, direction, vertical, *_, upflow = values.T
-    across = np.hypot(speed * np.sin(direction), vertical + speed * np.sin(upflow)).max()
-    if across > 0.01:
+    if (farthest := np.degrees(np.abs(values[:, 1])).max()) > TURNED:
         notes.append(
-            f"{path} has up to {across:.3g} m/s of wind across the shaft's horizontal (direction, vertical speed, upflow); "
-            "the blades feel the wind along it only."
+            f"{path} turns the wind by up to {farthest:.3g} degrees against x, along which the nacelle's axis lies; it does not follow."
         )
     wind = UniformWind(table[:, 0], values, reference_height, reference_length, path, tuple(notes))
     if not wind.mean_speed > 0:
@@ -183,8 +181,9 @@ def harmonics_of_uniform(
     speed, direction, vertical, across, exponent, linear, gust, upflow = wind.at(time).T
     along = np.cos(direction) * np.cos(upflow)
 
-    constant = speed * (across * x * np.sin(direction) + linear * (hub_height - wind.reference_height))
-    constant = constant / wind.reference_length + gust - np.tan(upflow) * vertical
+    level = speed * (across * x * np.sin(direction) + linear * (hub_height - wind.reference_height))
+    level = level / wind.reference_length + gust
+    constant = level - np.tan(upflow) * vertical
     upwards = along * speed * linear / wind.reference_length  # [1/s]
     sideways = along * speed * across * np.cos(direction) / wind.reference_length
 
@@ -194,7 +193,11 @@ def harmonics_of_uniform(
         shape = profile_amplitudes(PowerLaw(e), hub_height, radii, weight, harmonics, reference)
         return np.concatenate([shape, profile_disc_fit(PowerLaw(e), hub_height, rotor_radius, reference)])
 
-    both = _over_exponents(power_law, exponent) * (along * speed)[:, None]
+    shapes = _over_exponents(power_law, exponent) * speed[:, None]
+    whole = shapes[:, 1 + 2 * harmonics] + level  # mean over the disc before it is turned
+    aside = -np.sin(direction) * (np.cos(upflow) * whole - np.sin(upflow) * vertical)
+    turned = np.stack([aside, np.sin(upflow) * whole + np.cos(upflow) * vertical], axis=1)
+    both = shapes * along[:, None]
     amplitudes, disc = both[:, : 1 + 2 * harmonics], both[:, 1 + 2 * harmonics :]
     for table in (amplitudes, disc):
         table[:, 0] += along * constant
@@ -203,7 +206,15 @@ def harmonics_of_uniform(
         amplitudes[:, 2] -= sideways * (weight @ radii)
     disc[:, 1] += upwards * rotor_radius
     disc[:, 2] += sideways * rotor_radius
-    return FieldHarmonics(step, amplitudes, disc, wind.mean_speed, wind.source, notes=wind.notes)
+    return FieldHarmonics(
+        step,
+        amplitudes,
+        disc,
+        wind.mean_speed,
+        wind.source,
+        notes=wind.notes,
+        across=turned if turned.any() else None,
+    )
 
 
 FEW = 33  # exponents; a file whose exponent changes at every line has thousands
