@@ -199,7 +199,7 @@ def summarise(path: str | os.PathLike[str]) -> LogSummary:
 # Entries of `run` that the sentence of `what_ran` tells; the case's name does not, as a person copies it from there.
 TOLD = (
     "method", "step", "corrector", "mode", "turbine", "wind", "wind_source", "wind_speed", "turbulence_intensity", "harmonics",
-    "seed", "is_reference",
+    "yaw_misalignment_deg", "upflow_deg", "tower_influence", "seed", "is_reference",
 )  # fmt: skip
 
 
@@ -216,6 +216,10 @@ def what_ran(run: Mapping[str, str]) -> str:
     words += f", on {run.get('turbine', '?')} in {run.get('wind_source', '')} wind".replace("  ", " ")
     speed, intensity = number(run, "wind_speed"), number(run, "turbulence_intensity")
     words += f" of {speed:g} m/s" if speed is not None else ""
+    for key, what in (("yaw_misalignment_deg", "yaw misalignment"), ("upflow_deg", "upflow")):
+        angle = number(run, key)
+        words += f", {what} {angle:g} degrees" if angle else ""
+    words += ", tower influence" if run.get("tower_influence") == "True" else ""
     # a series' own intensity is not a point's; where it is, the log tells what the rotor keeps of it
     where = " at a point" if run.get("wind_strength") else ""
     words += f", intensity {intensity:g}{where}" if intensity else ""

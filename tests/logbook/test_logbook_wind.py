@@ -28,6 +28,7 @@ from fatigue_runner.logbook import (
 )
 from fatigue_runner.logbook.commands import app
 from fatigue_runner.logbook.schema import TOPICS, fields_in
+from fatigue_runner.logbook.summary import what_ran
 from fatigue_runner.trajectory import Trajectory
 
 
@@ -168,3 +169,16 @@ def test_info_says_how_strong_the_wind_is_where_and_shows_its_amplitudes_when_al
     assert "wind_speed" in text and "wind_cos_2" not in text and "and 4 amplitudes" in text
     text = CliRunner().invoke(app, ["info", "--all", str(path)]).output
     assert "wind_cos_2" in text and "and 4 amplitudes" not in text
+
+
+def test_the_sentence_on_what_ran_says_where_the_wind_came_from_and_whether_the_tower_counted():
+    run = {
+        "method": "rk4",
+        "step": "0.05",
+        "turbine": "nrel5mw",
+        "wind_source": "constant",
+        "wind_speed": "8.0",
+    }
+    assert what_ran(run) == "rk4 at 50 ms, on nrel5mw in constant wind of 8 m/s"
+    turned = run | {"yaw_misalignment_deg": "-8.0", "upflow_deg": "0.0", "tower_influence": "True"}
+    assert what_ran(turned).endswith("of 8 m/s, yaw misalignment -8 degrees, tower influence")
