@@ -21,7 +21,7 @@ INTERPOLATIONS = ("cubic", "bilinear")
 # more of OpenFAST's field at 8 m/s than blade elements that see it point by point. The secant over sqrt(3) standard deviations
 # is the best line for a Gaussian wind (Gauss-Hermite); a blade feels 0.13 V at 8 m/s and 0.11 V at 18 m/s (class B).
 # Thrust (mean radius 0.63), bending (0.70) and the flap mode (0.79) answer as their own weights would have it. The tangential force (0.58)
-# would be a fifth smaller then; it stays, because the lateral turbulence, which drives the tower sideways, is left out.
+# would be a fifth smaller then, and the tower's side-side load in turbulence a sixth to a third too small (docs/validation.md).
 SWING, SLOPE = 0.2, 1e-4
 OF_THEIR_OWN_RADIUS = ("thrust", "bending", "flap")
 REACH = (0.7, 1.2)

@@ -54,7 +54,7 @@ def test_in_a_turbulent_field_where_the_pitch_rests_all_loads_wear_as_openfasts(
 
 def test_in_a_turbulent_field_where_the_pitch_works_flap_and_fore_aft_wear_as_openfasts():
     for pair in field_equivalents(18.0, 6):
-        # edge: its mode is collective here; side-side: no lateral turbulence
+        # edge: its mode is collective here; side-side: docs/validation.md
         allowed = {EDGE: 0.08, SIDE_SIDE: 0.12}.get(pair.channel, 0.05)
         assert pair.ratio == pytest.approx(1.0, abs=allowed), pair
 
