@@ -134,7 +134,8 @@ def _warm_up(plan: Plan, jobs: Sequence[Job]) -> None:
     count_channels({"": [0.0, 1.0, 0.0, 1.0]}, plan.campaign.fatigue.wohler_exponents, 1.0)
     pending = [case.integration for job in jobs for case in (*job.references, *job.cases)]
     methods = {(found.method, found.corrector, found.mode): found for found in pending}
-    winds = {wind.source.triples > 0: wind for wind in plan.resolved.winds}
+    layout = plan.resolved.turbine.layout
+    winds = {layout.beyond(wind.source.channels): wind for wind in plan.resolved.winds}
     for found in methods.values():
         outputs = 1 + math.ceil(2 * found.step * plan.campaign.output_rate)
         for wind in winds.values():
