@@ -16,7 +16,6 @@ from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.aerodynamics import LOAD_NAMES, rotor_loads
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.lanes import evaluate
-from fatigue_runner.turbine.model import HARMONIC
 from fatigue_runner.turbine.table_builder import turbine_blade
 from fatigue_runner.wind import ConstantWind, FullFieldWind, TurbulentWind
 from fatigue_runner.wind.azimuth import wind_at
@@ -31,10 +30,10 @@ def turbine():
 
 def folded(turbine, state, signals):
     """State derivatives under any wind signals (n, 3 or more)."""
-    known = wind_channels(signals.shape[1])
-    padded = np.zeros((HARMONIC.layout.wind_size(known), len(signals)))
-    padded[HARMONIC.layout.wind_rows(known)] = signals.T
-    return evaluate(turbine.kernel_data(0.0, True), state, padded)[0]
+    data, known = turbine.kernel_data(0.0, True), wind_channels(signals.shape[1])
+    padded = np.zeros((data.model.layout.wind_size(known), len(signals)))
+    padded[data.model.layout.wind_rows(known)] = signals.T
+    return evaluate(data, state, padded)[0]
 
 
 def test_without_amplitudes_the_kernel_with_harmonics_is_the_plain_one(turbine):
