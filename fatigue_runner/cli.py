@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 # The rooms' commands, loaded when they are called: modules with a Typer app named `app`.
 MOUNTED = {
     "report": "fatigue_runner.report.commands",
+    "compare": "fatigue_runner.report.compare_command",
     "view": "fatigue_runner.viewer.commands",
     "logs": "fatigue_runner.logbook.commands",
     "turbine": "fatigue_runner.integrators.commands",

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Protocol
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import write_atomically
+from fatigue_runner.report.blocks import Section
 from fatigue_runner.report.rundata import Run, load_run
 
 
@@ -23,9 +26,24 @@ def write_report(run_dir: Path) -> Path:
 
 def render(run: Run) -> str:
     """The report of a run as one HTML document."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
     from fatigue_runner.report.sections import builders
+
+    return render_sections(run, [section for build in builders() if (section := build(run)) is not None])
+
+
+class Headed(Protocol):
+    """What a page's head says."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def facts(self) -> list[tuple[str, str]]: ...
+
+
+def render_sections(run: Headed, sections: Sequence[Section]) -> str:
+    """Sections under a head as one HTML document."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("fatigue_runner.report", "."),
@@ -35,7 +53,6 @@ def render(run: Run) -> str:
         lstrip_blocks=True,
     )
     environment.filters["data_uri"] = _data_uri
-    sections = [section for build in builders() if (section := build(run)) is not None]
     return environment.get_template("page.html").render(run=run, sections=sections)
 
 
