@@ -70,10 +70,13 @@ def simulate(
     pitch that varies in time. A case that diverges ends early: see `diverged_at`. corrector: a name of
     `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid", which guards it. operation: "fixed" holds the pitch, "controlled"
     has the turbine's controller, "torque-law" its torque at fine pitch. Raises InputError
-    for an unknown method or turbine, a step that is not positive and a malformed state.
+    for an unknown method or turbine, a step that is not positive, a malformed state, a controller that makes the turbine unstable and
+    aerodynamic tables that end below the pitch which the wind needs.
     """
     from fatigue_runner.integrators import Ensemble, Integrator
     from fatigue_runner.integrators import simulate as run
+    from fatigue_runner.turbine.envelope import check_wind
+    from fatigue_runner.turbine.loop import check_loop
 
     if isinstance(turbine, str):
         turbine = load_turbine(turbine)
@@ -93,6 +96,8 @@ def simulate(
         corrector = find(corrector)
     integrator = Integrator(method, step, corrector, mode)
     wind = wind.on(turbine.rotor)
+    check_loop(turbine)
+    check_wind(turbine, wind.mean_speed)
     start = _state(turbine, initial, wind, first_pitch(pitch))
     return run(Ensemble(turbine, [wind], start[None, :], duration, output_step, pitch), integrator)[0]
 

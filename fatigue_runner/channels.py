@@ -5,7 +5,7 @@ Moments are about the blade-root and tower-base axes as OpenFAST's RootMyb/RootM
 
 from __future__ import annotations
 
-from fatigue_runner.layout import ACROSS, HARMONICS, T2B1I1CG, T2B2CG
+from fatigue_runner.layout import ACROSS, DEGREES, HARMONICS, SEEN_OF_CONTROL, T2B1I1CG, T2B2CG
 from fatigue_runner.layout import Channel as Channel
 
 STATES = T2B1I1CG.states
@@ -16,7 +16,7 @@ WIND_SIGNALS = T2B1I1CG.wind
 WIND_ACROSS = ACROSS  # what a wind has beside them that does not blow straight on
 WIND_HARMONICS = HARMONICS  # and one of more than one harmonic
 
-LOADS = (
+_BY_EQUATIONS = (
     Channel("tower_base_fore_aft_moment", "N.m", "tower-base fore-aft moment", "kN·m", 1e-3),
     Channel("tower_base_side_side_moment", "N.m", "tower-base side-side moment", "kN·m", 1e-3),
     Channel("blade1_root_flapwise_moment", "N.m", "blade 1 root flapwise moment", "kN·m", 1e-3),
@@ -38,6 +38,15 @@ LOADS = (
     Channel("tower_top_side_side_acceleration", "m/s2", "tower-top side-side acceleration", "m/s²"),
 )
 
+# What follows of them and of who steers (OpenFAST's GenPwr and BldPitch1)
+_BY_OPERATION = (
+    Channel("generator_power", "W", "generator power (electrical)", "kW", 1e-3),
+    Channel("blade_pitch", "rad", "blade pitch", "deg", DEGREES),
+)
+
+LOADS = (*_BY_EQUATIONS, *_BY_OPERATION)
+EQUATION_LOADS = tuple(c.name for c in _BY_EQUATIONS)
+
 STATE_NAMES = tuple(c.name for c in STATES)
 WIND_NAMES = tuple(c.name for c in WIND_SIGNALS)
 LOAD_NAMES = tuple(c.name for c in LOADS)
@@ -50,7 +59,8 @@ FATIGUE_CHANNELS = (
     "tower_base_side_side_moment",
 )
 
-BY_NAME = {c.name: c for c in (*STATES, *T2B2CG.states, *WIND_SIGNALS, *WIND_ACROSS, *WIND_HARMONICS, *LOADS)}
+_OF_WIND = (*WIND_SIGNALS, *WIND_ACROSS, *WIND_HARMONICS)
+BY_NAME = {c.name: c for c in (*STATES, *T2B2CG.states, *_OF_WIND, *LOADS, *SEEN_OF_CONTROL)}
 
 
 def wind_channels(columns: int) -> tuple[Channel, ...]:

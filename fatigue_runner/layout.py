@@ -279,6 +279,13 @@ HARMONICS = harmonic_channels(MOST_HARMONICS)
 
 PITCH = Channel("pitch", "rad", "blade pitch", "deg", DEGREES)
 
+# What a controller lets a person see besides pitch, torque and its states
+PITCH_RATE = Channel("pitch_rate", "rad/s", "blade pitch rate", "deg/s", DEGREES)
+PITCH_RATE_LIMITED = Channel("pitch_rate_limited", "-", "whether the pitch turns faster than its limit", "-")
+PITCH_COMMAND = Channel("pitch_command", "rad", "pitch that the actuator is asked for", "deg", DEGREES)
+TORQUE_REGION = Channel("torque_region", "-", "region of the torque law", "-")
+SEEN_OF_CONTROL = (PITCH_RATE, PITCH_RATE_LIMITED, PITCH_COMMAND, TORQUE_REGION)
+
 _TOWER = (
     _metres("tower_fore_aft", "tower-top fore-aft"),
     _metres("tower_side_side", "tower-top side-side"),
@@ -296,7 +303,8 @@ _DRIVETRAIN = (
 # rotor and generator
 T2B1I1CG = Layout((*_TOWER, *_FLAPS, _metres("edge", "collective edge"), *_DRIVETRAIN), WIND)
 T2B2CG = Layout((*_TOWER, *_FLAPS, *_EDGES, *_DRIVETRAIN), WIND)
-FAMILIES = {"t2b1i1cg": T2B1I1CG, "t2b2cg": T2B2CG}
+DEFAULT_FAMILY = "t2b1i1cg"
+FAMILIES = {DEFAULT_FAMILY: T2B1I1CG, "t2b2cg": T2B2CG}
 
 
 def family_of(names: Sequence[str]) -> str | None:

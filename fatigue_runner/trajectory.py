@@ -20,7 +20,8 @@ class Trajectory:
     The status arrays have one entry per output interval, (n-1,): `accepted` is False where any step in the interval fell back,
     `discrepancy` and `threshold` are the hybrid's norms (NaN where there is no test), `local_error` the embedded error estimate's largest
     scaled component (NaN for methods without one). `diverged_at` [s] is None for a finished case; otherwise the arrays end there.
-    pitch (n,) [rad]; control {state of the controller: (n,)}, empty where the pitch is given.
+    pitch (n,) [rad]; control {state of the controller: (n,)} and what else is seen of it, `control_signals`: the pitch's rate, the torque's
+    region, ...; empty where the pitch is given.
     """
 
     time: np.ndarray
@@ -40,6 +41,7 @@ class Trajectory:
     wind_signals: tuple[Channel, ...] | None = None
     pitch: np.ndarray = field(default_factory=lambda: np.empty(0))
     control: dict[str, np.ndarray] = field(default_factory=dict)
+    control_signals: tuple[Channel, ...] = ()
 
     @property
     def winds(self) -> tuple[Channel, ...]:

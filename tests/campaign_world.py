@@ -41,6 +41,10 @@ def build_world(monkeypatch: Any) -> World:
     """Put the toy turbine and integrators where the campaign looks for the real ones."""
     world = World([], {}, {})
     turbine = types.SimpleNamespace(
+        controller=None,
+        control=None,
+        pitches=False,
+        watched={},
         name="toy",
         hash="0" * 64,
         parameters={"g_ratio": 97.0},

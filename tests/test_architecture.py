@@ -34,7 +34,7 @@ FLOOR = {
 # Which rooms a room may import. A new room is one line here.
 MAY_IMPORT = {
     "inputs": set(),
-    "control": set(),
+    "control": {"inputs"},
     "turbine": {"inputs", "control"},
     "wind": {"inputs"},
     "fatigue": set(),

@@ -20,6 +20,7 @@ from fatigue_runner.campaign.evaluate import (
 )
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.spec import Campaign
+from fatigue_runner.channels import Channel
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.fatigue.sections import Wall
 from fatigue_runner.results.columns import DESCRIPTION
@@ -33,6 +34,7 @@ class Setup:
     campaign: Campaign
     turbine: str  # name or path, for `load_turbine`
     turbine_hash: str
+    states: tuple[Channel, ...]
     logs: Path
     metadata: dict[str, str] = field(default_factory=dict)  # of every log's `run` record
     attachments: dict[str, bytes] = field(default_factory=dict)
@@ -79,7 +81,8 @@ def run_block(job: Job) -> list[dict[str, Any]]:
             except Exception as error:  # one case's trouble (a full disk, a bad wind) must not end the others
                 if case.id in wanted:
                     source = None if isinstance(wind, Exception) else wind
-                    records.append(_record(case, failed_row(case, source, error, job.setup.campaign), 0))
+                    row = failed_row(case, source, error, job.setup.campaign, job.setup.states)
+                    records.append(_record(case, row, 0))
     return records
 
 

@@ -50,6 +50,7 @@ def make_cases(resolved: Resolved) -> list[Case]:
             simulation = {
                 "code": code_hash(),
                 "turbine": resolved.turbine.hash,
+                "watched": resolved.turbine.watched,
                 "wind": wind.named.identity,
                 "integration": integration.identity,
                 **common,

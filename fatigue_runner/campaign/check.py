@@ -9,6 +9,7 @@ from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.campaign.spec import Pitch
 from fatigue_runner.errors import InputError
 from fatigue_runner.results.lifetime_section import check_covered
+from fatigue_runner.turbine.dynamics import signals_of_control
 
 
 def check(resolved: Resolved) -> list[str]:
@@ -30,22 +31,35 @@ def check(resolved: Resolved) -> list[str]:
 
 
 def _check_logged_channels(resolved: Resolved) -> None:
-    """Harmonics beyond those of the winds: the spec knows the names, only the winds how many there are."""
+    """What not every case has: the spec knows all names, only winds and controller which of them there are."""
     some = (*channels.WIND_ACROSS, *channels.WIND_HARMONICS)
     everywhere = set(some).intersection(*(wind.source.channels for wind in resolved.winds))
     missing = {c.name for c in some if c not in everywhere}
-    for index, name in enumerate(resolved.campaign.log.channels or ()):
+    turbine, log = resolved.turbine, resolved.campaign.log
+    seen = () if turbine.controller is None else tuple(c.name for c in turbine.controller.seen)
+    of_others = set(signals_of_control()) - {*turbine.layout.names, *seen}
+    for index, name in enumerate(log.channels or ()):
+        where = resolved.source.where(("log", "channels", index))
         if name in missing and channels.BY_NAME[name] in channels.WIND_ACROSS:
             raise InputError(
-                f"{resolved.source.where(('log', 'channels', index))}: {name!r} cannot be logged, the wind blows straight on; remove it or "
+                f"{where}: {name!r} cannot be logged, the wind blows straight on; remove it or "
                 "give the wind `yaw_misalignment` or `upflow`"
             )
         if name in missing:
             harmonics = min(wind.source.harmonics for wind in resolved.winds)
             raise InputError(
-                f"{resolved.source.where(('log', 'channels', index))}: {name!r} cannot be logged, the wind has {harmonics} azimuthal "
+                f"{where}: {name!r} cannot be logged, the wind has {harmonics} azimuthal "
                 f"harmonic{'s' * (harmonics != 1)}; remove it or give the wind more `harmonics`"
             )
+        if name in of_others:
+            raise InputError(
+                f"{where}: {name!r} cannot be logged with operation {turbine.operation!r}; remove it or use operation: controlled"
+            )
+    if "control" in (log.topics or ()) and not seen:
+        where = resolved.source.where(("log", "topics", (log.topics or []).index("control")))
+        raise InputError(
+            f"{where}: with operation {turbine.operation!r} there is no controller to log; remove 'control'"
+        )
 
 
 def _check_lifetime(resolved: Resolved) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -13,9 +13,11 @@ import numpy as np
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.spec import Campaign
+from fatigue_runner.channels import Channel
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.fatigue.sections import Wall
-from fatigue_runner.results.columns import WIND, columns, damage_keys, fatigue_keys
+from fatigue_runner.layout import PITCH_RATE, PITCH_RATE_LIMITED
+from fatigue_runner.results.columns import WIND, columns, damage_keys, fatigue_keys, statistics_keys
 from fatigue_runner.results.table import known
 from fatigue_runner.trajectory import Trajectory
 
@@ -108,43 +110,63 @@ def make_row(
 
     wind: the case's wind source; reference: that of the same wind, None where there is none or it diverged.
     """
-    row = empty_row(case, campaign) | describe(case, wind, campaign) | _costs(trajectory)
+    row = empty_row(case, campaign, trajectory.states) | describe(case, wind, campaign) | _costs(trajectory)
     if trajectory.diverged_at is not None:
         return row
     speed = own.trajectory.wind[:, 0]
     row["rotor_intensity"] = np.std(speed) / np.mean(speed)
     row |= own.damage
     row |= {f"del_{suffix}": own.loads[channel, m] for channel, m, suffix in _fatigue(campaign)}
-    row |= {
-        f"{name}_{channel}": function(series)
-        for channel, series in own.trajectory.loads.items()
-        for name, function in (("mean", np.mean), ("min", np.min), ("max", np.max))
-    }
-    time = own.trajectory.time
-    row |= {
-        f"{name}_{channel}": time[function(series)]
-        for channel, series in own.trajectory.loads.items()
-        for name, function in (("min_time", np.argmin), ("max_time", np.argmax))
-    }
+    row |= _statistics(own.trajectory) | _pitch_rate(own.trajectory)
     if reference is not None and not case.integration.is_reference:
-        errors = _errors(own, reference, campaign)
-        # states beyond the table's columns count in the worst and in the mean
-        row |= {name: value for name, value in errors.items() if name in row}
+        row |= _errors(own, reference, campaign)
     return {name: known(row[name]) for name in row}
 
 
-def failed_row(case: Case, wind: Any, error: Exception, campaign: Campaign) -> dict[str, Any]:
+def _statistics(trajectory: Trajectory) -> dict[str, Any]:
+    """Of every load, and of those states that have columns for them."""
+    names = [channel.name for channel in trajectory.states]
+    series = dict(zip(names, trajectory.state.T, strict=True)) | trajectory.loads
+    time = trajectory.time
+    functions: dict[str, Any] = {
+        "mean": np.mean,
+        "min": np.min,
+        "max": np.max,
+        "std": np.std,
+        "min_time": lambda values: time[np.argmin(values)],
+        "max_time": lambda values: time[np.argmax(values)],
+    }
+    keys = statistics_keys(trajectory.states)
+    return {
+        f"{name}_{channel}": functions[name](series[channel]) for name, channel in keys if channel in series
+    }
+
+
+def _pitch_rate(trajectory: Trajectory) -> dict[str, Any]:
+    """How fast a controller turns the blades, and for how long faster than its limit."""
+    rate, beyond = (trajectory.control.get(c.name) for c in (PITCH_RATE, PITCH_RATE_LIMITED))
+    if rate is None or beyond is None or len(rate) < 2:
+        return {}
+    return {
+        "pitch_rate_max": np.max(np.abs(rate)),
+        "pitch_rate_limited_time": np.mean(beyond) * trajectory.duration,
+    }
+
+
+def failed_row(
+    case: Case, wind: Any, error: Exception, campaign: Campaign, states: Sequence[Channel]
+) -> dict[str, Any]:
     """The row of a case that could not run or be written; the error's text says why."""
     text = " ".join(str(error).split()) or type(error).__name__
-    row = empty_row(case, campaign) | (describe(case, wind, campaign) if wind is not None else {})
+    row = empty_row(case, campaign, states) | (describe(case, wind, campaign) if wind is not None else {})
     return row | {"status": "failed", "error_message": text}
 
 
-def empty_row(case: Case, campaign: Campaign) -> dict[str, Any]:
+def empty_row(case: Case, campaign: Campaign, states: Sequence[Channel]) -> dict[str, Any]:
     """Every column, with what is known of a case before it runs."""
-    row: dict[str, Any] = dict.fromkeys(
-        columns(campaign.fatigue.channels, campaign.fatigue.wohler_exponents, angles=campaign.fatigue.angles)
-    )
+    settings = campaign.fatigue
+    names = columns(settings.channels, settings.wohler_exponents, states, settings.angles)
+    row: dict[str, Any] = dict.fromkeys(names)
     return row | {
         "case_id": case.id,
         "method": case.integration.method,

@@ -112,8 +112,12 @@ def _load_turbine(turbine: str, source: Source) -> Turbine:
 
 
 def _operated(turbine: Turbine, campaign: Campaign, source: Source) -> Turbine:
+    from fatigue_runner.turbine.loop import check_loop
+
     try:
-        return turbine.operated(campaign.operation)
+        operated = turbine.operated(campaign.operation)
+        check_loop(operated)
+        return operated
     except InputError as error:
         raise InputError(f"{source.where(('operation',))}: {error}") from None
 
@@ -173,13 +177,17 @@ def _winds(
     campaign: Campaign, turbine: Turbine, pitch: float | PitchSeries, source: Source
 ) -> list[ResolvedWind]:
     """Every wind with its start; those of one mean wind share it."""
+    from fatigue_runner.turbine.envelope import check_wind
+
     place = Place(source, ("wind",))
     winds, starts = [], _Starts(campaign, turbine, pitch)
     for named in campaign.wind.winds(Site(turbine.rotor, campaign.duration, place)):
         where = place.where(*named.path)
         blowing = _blowing(named, turbine.rotor, campaign.duration, where)
         try:
-            winds.append(ResolvedWind(named, blowing, starts.of(blowing), blowing.notes))
+            told = check_wind(turbine, blowing.mean_speed)
+            notes = (*blowing.notes, *([f"{where}: {told}"] if told else []))
+            winds.append(ResolvedWind(named, blowing, starts.of(blowing), notes))
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
     return winds

@@ -97,6 +97,7 @@ def _simulate(
         plan.campaign,
         plan.resolved.turbine_source,
         plan.resolved.turbine.hash,
+        plan.resolved.turbine.layout.states,
         store.out.resolve() / "logs",
         facts,
         {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan.resolved).encode()},
@@ -152,7 +153,9 @@ def _collect(plan: Plan, store: Store, simulated: int) -> Results:
     fatigue = plan.campaign.fatigue
     return Results(
         out=store.out,
-        columns=columns(fatigue.channels, fatigue.wohler_exponents, angles=fatigue.angles),
+        columns=columns(
+            fatigue.channels, fatigue.wohler_exponents, plan.resolved.turbine.layout.states, fatigue.angles
+        ),
         rows=[store.records[case.id]["row"] for case in plan.cases],
         simulated=simulated,
         kept=len(plan.cases) - simulated,

@@ -30,8 +30,8 @@ lifetime         the life that the cases stand for, from the site's wind: {clima
 
 log.enabled      one MCAP file per case in logs/ (default true)
 log.compression  `zstd` (default), `lz4` or `none`
-log.topics       which of `state`, `loads`, `status`, `wind` (default all; less cannot be read back)
-log.channels     names of states, wind signals and loads (default all)
+log.topics       which of `state`, `loads`, `status`, `wind`, `control` (default all; less cannot be read back)
+log.channels     names of states, wind signals, loads and signals of the controller (default all)
 
 A sweep is a number, a list of numbers, {start, stop, step}, {start, stop, count} (both ends included),
 {random: {count, low, high, seed}}, or a list of such pieces.
@@ -178,7 +178,7 @@ class Fatigue(Section):
         return list(named.values())
 
 
-Topic = Literal["state", "loads", "status", "wind"]
+Topic = Literal["state", "loads", "status", "wind", "control"]
 
 
 class Log(Section):
@@ -192,9 +192,14 @@ class Log(Section):
     @field_validator("channels")
     @classmethod
     def _signals_exist(cls, channels: list[str] | None) -> list[str] | None:
+        from fatigue_runner.turbine.dynamics import signals_of_control
+
+        known = dict.fromkeys((*BY_NAME, *signals_of_control()))
         for name in channels or ():
-            if name not in BY_NAME:
-                raise problem(f"{name!r} is no state, wind signal or load{did_you_mean(name, BY_NAME)}")
+            if name not in known:
+                raise problem(
+                    f"{name!r} is no state, wind signal, load or signal of a controller{did_you_mean(name, known)}"
+                )
         return channels
 
 

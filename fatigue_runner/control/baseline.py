@@ -10,15 +10,60 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
+import numpy as np
+from pydantic import Field, model_validator
+
+from fatigue_runner.control.section import ControlSection, Positive
 from fatigue_runner.control.submodel import Root, Submodel, Values, larger, smaller
-from fatigue_runner.layout import RPM, Channel, FirstOrder
+from fatigue_runner.inputs.section import problem
+from fatigue_runner.layout import RPM, TORQUE_REGION, Channel, FirstOrder
 
 SPEED, INTEGRAL = "filtered_generator_speed", "speed_error_integral"
+BELOW_RATED = -1.0  # about where the integral rests below rated [rad]
 
-# where steady operation may have the integral: just below zero below rated; above, it grows with the pitch that holds the speed
-INTEGRALS = (-1.0, 5.0, 15.0, 40.0, 80.0, 120.0, 150.0, 200.0, 250.0)
+
+class BaselineSection(ControlSection):
+    """Its keys: gains at fine pitch, speeds of the high-speed side. `turbine/data/nrel5mw.yaml` has them with their units."""
+
+    kind: ClassVar[str] = "baseline"
+
+    rated_speed_rpm: Positive
+    proportional_gain: Positive | None = None
+    integral_gain: Positive | None = None
+    gain_schedule_pitch_deg: Positive | None = None
+    filter_frequency_hz: Positive
+    cut_in_speed_rpm: Positive
+    region_2_speed_rpm: Positive
+    largest_torque: Positive
+    fine_pitch_deg: float = Field(default=0.0, gt=-45, lt=45)
+    region_3_pitch_deg: Positive = 1.0
+    region_3_blend_deg: Positive = 0.25
+    saturation_blend_deg: Positive = 0.05
+    unwind_rate: Positive = 10.0
+    unwind_blend: Positive = 0.2
+    torque_blend: Positive = 300.0
+
+    @model_validator(mode="after")
+    def _rising_speeds(self) -> BaselineSection:
+        if not self.cut_in_speed_rpm < self.region_2_speed_rpm < self.rated_speed_rpm:
+            raise problem(
+                "speeds must rise from cut_in_speed_rpm over region_2_speed_rpm to rated_speed_rpm; "
+                f"got {self.cut_in_speed_rpm:g}, {self.region_2_speed_rpm:g}, {self.rated_speed_rpm:g}",
+                key="region_2_speed_rpm",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _gains(self) -> BaselineSection:
+        for name in GAINS if self.tuning is None else ():
+            if getattr(self, name) is None:
+                raise problem("is missing; give it, or `tuning`, from which all gains follow", key=name)
+        return self
+
+
+GAINS = ("proportional_gain", "integral_gain", "gain_schedule_pitch_deg")
 
 _STATES = (
     FirstOrder(Channel(SPEED, "rad/s", "filtered generator speed", "rpm", RPM), 1e-3, "generator_speed"),
@@ -49,15 +94,30 @@ PARAMETERS = {
 }
 
 
+def _laws(w: Any, p: Values) -> tuple[Any, Any, Any, Any]:
+    """Torque of regions 1.5, 2, 2.5 and 3 at a filtered generator speed w."""
+    return (
+        p["ctl_s15"] * (w - p["ctl_cut_in"]),
+        p["ctl_k"] * w * w,
+        p["ctl_s25"] * (w - p["ctl_w25"]),
+        p["ctl_power"] / w + p["ctl_torque"],
+    )
+
+
+def _beyond_fine(states: Values, p: Values, sqrt: Root) -> Any:
+    """Pitch above the fine pitch [rad]: the positive root of theta (1 + theta / theta_K) = u."""
+    demand = p["ctl_kp"] * (states[SPEED] - p["ctl_rated"]) + p["ctl_ki"] * states[INTEGRAL]
+    u = larger(demand, 0 * demand, p["ctl_u_blend"], sqrt)
+    return p["ctl_gk"] / 2 * (sqrt(1 + 4 * u / p["ctl_gk"]) - 1)
+
+
 def outputs(states: Values, p: Values, sqrt: Root) -> dict[str, Any]:
     """Pitch [rad] and generator torque [N m]."""
     w, blend = states[SPEED], p["ctl_t_blend"]
-    demand = p["ctl_kp"] * (w - p["ctl_rated"]) + p["ctl_ki"] * states[INTEGRAL]
-    u = larger(demand, 0 * demand, p["ctl_u_blend"], sqrt)
-    beyond = p["ctl_gk"] / 2 * (sqrt(1 + 4 * u / p["ctl_gk"]) - 1)
-    line = smaller(p["ctl_s15"] * (w - p["ctl_cut_in"]), p["ctl_k"] * w * w, blend, sqrt)
-    below = larger(larger(line, 0 * w, blend, sqrt), p["ctl_s25"] * (w - p["ctl_w25"]), blend, sqrt)
-    rated = p["ctl_power"] / w + p["ctl_torque"]
+    beyond = _beyond_fine(states, p, sqrt)
+    begin, optimal, slip, rated = _laws(w, p)
+    line = smaller(begin, optimal, blend, sqrt)
+    below = larger(larger(line, 0 * w, blend, sqrt), slip, blend, sqrt)
     place = (beyond - p["ctl_pitch_3"]) / p["ctl_pitch_blend"]
     step = place / sqrt(1 + place * place)
     share = (2 + step * (3 - step * step)) / 4  # the polynomial cuts the tails of the root off
@@ -78,12 +138,32 @@ def rates(states: Values, p: Values, sqrt: Root) -> dict[str, Any]:
     }
 
 
-BASELINE = Submodel("baseline", _STATES, PARAMETERS, outputs, rates)
+def start(p: Values, speed: float, pitch: float) -> tuple[float, ...]:
+    beyond = pitch - p["ctl_fine"]
+    # without pitch control the integral goes its own way: up to where the unwinding holds it, or on and on above rated
+    if not beyond > 0 or not p["ctl_ki"]:
+        return speed, BELOW_RATED
+    return speed, beyond * (1 + beyond / p["ctl_gk"]) / p["ctl_ki"]
 
 
-def parameters(given: Mapping[str, Any], law: Mapping[str, float], pitching: bool = True) -> dict[str, float]:
-    """`PARAMETERS` from a turbine file's `control` section (SI, degrees and rpm as its names say) and the generator's law
-    (`parameters.generator_law`); without `pitching` the blades stay at fine pitch."""
+def speeds(p: Values) -> tuple[float, float]:
+    return 0.9 * p["ctl_cut_in"], p["ctl_rated"]
+
+
+def observe(states: Values, p: Values) -> dict[str, Any]:
+    """The region whose law gives the torque, corners not rounded."""
+    begin, optimal, slip, rated = _laws(states[SPEED], p)
+    line = np.minimum(begin, optimal)
+    region = np.where(begin < optimal, 1.5, 2.0)
+    region = np.where(begin <= 0, 1.0, region)
+    region = np.where(slip > np.maximum(line, 0), 2.5, region)
+    held = _beyond_fine(states, p, np.sqrt) > p["ctl_pitch_3"]
+    region = np.where((np.maximum(line, slip) >= rated) | held, 3.0, region)
+    return {TORQUE_REGION.name: region}
+
+
+def read(given: Mapping[str, Any], law: Mapping[str, float], pitching: bool = True) -> dict[str, float]:
+    """`PARAMETERS` [SI]; degrees and rpm as the section's names say."""
     rpm, degrees = math.pi / 30, math.pi / 180
     cut_in, region_2 = given["cut_in_speed_rpm"] * rpm, given["region_2_speed_rpm"] * rpm
     on = 1.0 if pitching else 0.0
@@ -109,3 +189,8 @@ def parameters(given: Mapping[str, Any], law: Mapping[str, float], pitching: boo
         "ctl_pitch_3": given["region_3_pitch_deg"] * degrees,
         "ctl_pitch_blend": given["region_3_blend_deg"] * degrees,
     }
+
+
+BASELINE = Submodel(
+    "baseline", _STATES, PARAMETERS, outputs, rates, read, start, speeds, (TORQUE_REGION,), observe
+)

@@ -184,13 +184,14 @@ def _trajectory(
     error, distance = out.errors[: n - 1, lane].copy(), out.discrepancy[: n - 1, lane].copy()
     signals, turbine = wind.at(time_points), block.turbine
     pitch = block.pitch.at(time_points) if isinstance(block.pitch, PitchSeries) else block.pitch
-    commanded = turbine.commanded(own)
+    loads = turbine.loads(own, signals, pitch, wind.channels)
     layout = block.data.model.layout
+    seen = () if turbine.controller is None else turbine.controller.seen
     return Trajectory(
         time=time_points,
         state=own,
         wind=signals,
-        loads=turbine.loads(own, signals, 0.0 if commanded else pitch, wind.channels),
+        loads=loads,
         accepted=out.accepted[: n - 1, lane].copy(),
         discrepancy=np.full(n - 1, np.nan) if np.isnan(limit) else distance,
         threshold=np.full(n - 1, limit),
@@ -202,6 +203,8 @@ def _trajectory(
         diverged_at=diverged_at if diverged_at >= 0 else None,
         states=block.data.model.layout.states,
         wind_signals=wind.channels,
-        pitch=commanded["pitch"] if commanded else np.broadcast_to(pitch, n).astype(float),
-        control={name: own[:, layout.row(name)].copy() for name in layout.names[2 * layout.freedoms :]},
+        pitch=loads["blade_pitch"],
+        control={name: own[:, layout.row(name)].copy() for name in layout.names[2 * layout.freedoms :]}
+        | turbine.observed(own),
+        control_signals=seen,
     )

@@ -40,6 +40,19 @@ def _wind(block: Trajectory, rows: int) -> dict[str, np.ndarray]:
     return found
 
 
+def _control(block: Trajectory, rows: int) -> dict[str, np.ndarray]:
+    """What is seen of a controller; its states stand among the states."""
+    found = {
+        c.name: np.asarray(block.control[c.name], float)
+        for c in block.control_signals
+        if c.name in block.control
+    }
+    for name, values in found.items():
+        if values.shape != (rows,):
+            raise LogError(f"signal {name} to log has shape {values.shape}; it must be ({rows},)")
+    return found
+
+
 def _status(
     block: Trajectory, extra: Mapping[str, np.ndarray | None], rows: int, first_row: int
 ) -> dict[str, np.ndarray]:
@@ -89,6 +102,7 @@ def columns(
         "state": _table(block.state, [c.name for c in block.states], "state", rows),
         "loads": loads,
         "wind": _wind(block, rows),
+        "control": _control(block, rows),
     }
     return {key: {"time": time, **fields} for key, fields in found.items() if fields}
 
@@ -114,7 +128,7 @@ def topics_of(
                 raise LogError(
                     f"cannot log channel {name!r}, the run does not have it{did_you_mean(name, there)}"
                 )
-    own = {"state": run.states, "wind": run.winds}
+    own = {"state": run.states, "wind": run.winds, "control": run.control_signals}
     found = []
     for t in kept:
         if t.key not in available:

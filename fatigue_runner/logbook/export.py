@@ -33,6 +33,7 @@ def table(log: Log) -> Columns:
     columns |= log.loads
     if len(log.wind):
         columns |= dict(zip((c.name for c in log.winds), log.wind.T, strict=True))
+    columns |= {c.name: log.control[c.name] for c in log.control_signals}
     for f in STATUS_FIELDS[1:]:
         values = getattr(log, "clamped_lookups_at" if f.name == "clamped_lookups" else f.name)
         if values.size:
@@ -43,7 +44,9 @@ def table(log: Log) -> Columns:
 def units_of(log: Log) -> dict[str, str]:
     """SI units of the columns of `table`."""
     status = {f.name: f.unit for f in STATUS_FIELDS}
-    known = {c.name: c.unit for c in (*channels.BY_NAME.values(), *log.states, *log.winds)}
+    known = {
+        c.name: c.unit for c in (*channels.BY_NAME.values(), *log.states, *log.winds, *log.control_signals)
+    }
     return status | known
 
 

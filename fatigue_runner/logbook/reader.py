@@ -31,7 +31,7 @@ class Log(Trajectory):
 
     Topics that the log does not hold are empty arrays; states of the turbine and wind signals that it does not
     hold are NaN. `states` and `winds` go on with the further ones that it holds, wind up to its highest azimuthal
-    harmonic. reference_error (n-1,), clamped_lookups_at (n-1,) counts per interval: empty where the
+    harmonic. pitch, control, reference_error (n-1,), clamped_lookups_at (n-1,) counts per interval: empty where the
     log does not hold them. run, result, units: metadata; complete: the whole run is there; lost: what was
     damaged, empty for a whole file.
     """
@@ -173,6 +173,11 @@ def assemble(tables: Tables, rows: int, intervals: int, contents: Contents) -> L
         wind_signals=winds,
     )
     log.loads = {k: v[:rows] for k, v in loads.items() if k != "time" and not k.startswith("_")}
+    log.pitch = log.loads.get("blade_pitch", log.pitch)
+    log.control_signals = _own("control", tables, units)
+    held = dict(zip((c.name for c in states), log.state.T, strict=True))
+    log.control = {name: values for name, values in held.items() if name not in channels.BY_NAME}
+    log.control |= {c.name: tables["control"][c.name][:rows] for c in log.control_signals}
     for name in STATUS_ARRAYS:
         if name in status:
             setattr(log, name, status[name][:intervals])

@@ -122,6 +122,8 @@ TOPICS: dict[str, Topic] = {
     "wind": Topic(
         "wind", "/wind", "Wind", 4, _fields((*channels.WIND_SIGNALS, *channels.WIND_HARMONICS)), open=True
     ),
+    # of a turbine under a controller; each has signals of its own
+    "control": Topic("control", "/turbine/control", "Control", 5, (_TIME,), open=True),
 }
 BY_TOPIC = {t.name: t for t in TOPICS.values()}
 BY_SCHEMA = {t.schema_name: t for t in TOPICS.values()}
@@ -151,6 +153,8 @@ def fields_in(data: bytes, name: str) -> tuple[Field, ...] | None:
             if f"{file.package}.{message.name}" != name:
                 continue
             if any(f.type not in kinds or f.label == _PROTO.LABEL_REPEATED for f in message.field):
+                return None
+            if not all(isinstance(f.name, str) for f in message.field):  # bytes that are no text
                 return None
             found = (Field(f.name, f.number, kinds[f.type]) for f in message.field)
             return tuple(sorted(found, key=lambda f: f.number))

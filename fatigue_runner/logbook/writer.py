@@ -230,7 +230,7 @@ class LogWriter:
             return
         if self._layout is None:
             # no row tells how many harmonics the wind has
-            topics = select_topics(self._topic_keys)
+            topics = [t for t in select_topics(self._topic_keys) if len(t.fields) > 1]
             self._begin(layout_for(tuple(t.only(WIND_NAMES) if t.key == "wind" else t for t in topics)))
         with self._writing():
             self._close_chunk()

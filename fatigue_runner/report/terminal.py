@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.channels import BY_NAME
 from fatigue_runner.results.cells import Row, format_percent, numbers
+from fatigue_runner.results.operation import pitch_rate_sentences
 from fatigue_runner.results.ranking import (
     LEVELS,
     MethodSummary,
@@ -30,7 +31,7 @@ def print_ranking(rows: Sequence[Row], console: Console) -> None:
 
     summaries = rank(rows)
     console.print(_table(rows, summaries, console))
-    for sentence in [*answer(summaries), *unseen_winds(summaries)]:
+    for sentence in [*answer(summaries), *unseen_winds(summaries), *pitch_rate_sentences(rows)]:
         console.print(escape(sentence))
 
 

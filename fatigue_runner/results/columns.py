@@ -53,6 +53,8 @@ CASE = (
     Column("rotor_intensity", "statistics", "standard deviation over mean of the wind averaged over the rotor, in the counted time"),
     _text("operation", "operation", "who steers: fixed, torque-law or controlled"),
     Column("pitch_deg", "operation", "blade pitch, positive to feather; empty where it varies in time", "deg"),
+    Column("pitch_rate_max", "statistics", "largest pitch rate of the controller, in the counted time", "rad/s"),
+    Column("pitch_rate_limited_time", "statistics", "counted time in which the pitch turns faster than its limit, which does not act", "s"),
     _text("method", "integrator", "integration method"),
     Column("step", "integrator", "its time step", "s"),
     _text("corrector", "integrator", "name of the learned corrector"),
@@ -82,10 +84,11 @@ _FATIGUE = (
     ("del_error", "relative error of that load against the reference's", "-"),
     ("damage_ratio", "damage over the reference's", "-"),
 )
-_STATISTICS = (
-    ("mean", "mean", None), ("min", "smallest", None), ("max", "largest", None),
-    ("min_time", "simulated time of the smallest", "s"), ("max_time", "simulated time of the largest", "s"),
-)  # fmt: skip
+_STATISTICS = {
+    "mean": ("mean", None), "min": ("smallest", None), "max": ("largest", None), "std": ("standard deviation", None),
+    "min_time": ("simulated time of the smallest", "s"), "max_time": ("simulated time of the largest", "s"),
+}  # fmt: skip
+_OF_STATES = ("rotor_speed",)  # states with statistics of their own, as every load has
 
 
 def damage_keys(angles: Mapping[str, Sequence[int]]) -> list[tuple[str, int, str]]:
@@ -95,9 +98,21 @@ def damage_keys(angles: Mapping[str, Sequence[int]]) -> list[tuple[str, int, str
     ]
 
 
+def statistics_keys(states: Sequence[Channel] = STATES) -> list[tuple[str, str]]:
+    """(statistic, channel) of every column of a statistic."""
+    named = {state.name: state for state in states}
+    measured = [*LOADS, *(named[name] for name in _OF_STATES if name in named)]
+    return [(figure, channel.name) for channel in measured for figure in _STATISTICS]
+
+
 def fatigue_keys(channels: Sequence[str], exponents: Sequence[float]) -> list[tuple[str, float, str]]:
     """(channel, exponent, suffix of its columns): `blade1_root_flapwise_moment_m10`."""
     return [(channel, m, f"{channel}_m{m:g}") for channel in channels for m in exponents]
+
+
+def _statistic(figure: str, channel: Channel) -> Column:
+    word, unit = _STATISTICS[figure]
+    return Column(f"{figure}_{channel.name}", "statistics", f"{word}: {channel.label}", unit or channel.unit)
 
 
 def table(
@@ -111,6 +126,7 @@ def table(
     angles: the azimuths [deg] around each place whose wall is counted.
     """
     loads = {load.name: load for load in LOADS}
+    measured = loads | {state.name: state for state in states}
     errors = [
         Column(f"nrmse_{state.name}", "accuracy", f"RMS error over the reference's range: {state.label}")
         for state in states
@@ -129,11 +145,7 @@ def table(
         )
         for place, angle, column in damage_keys(angles or {})
     ]
-    statistics = [
-        Column(f"{figure}_{load.name}", "statistics", f"{word}: {load.label}", unit or load.unit)
-        for load in LOADS
-        for figure, word, unit in _STATISTICS
-    ]
+    statistics = [_statistic(figure, measured[name]) for figure, name in statistics_keys(states)]
     return [*CASE, *errors, *fatigue, *damage, *statistics]
 
 

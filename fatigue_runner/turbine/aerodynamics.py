@@ -194,6 +194,25 @@ def power_coefficient(blade: BladeAerodynamics, tip_speed_ratio: ArrayLike, pitc
     return np.asarray(tip_speed_ratio) * torque * np.cos(blade.cone)
 
 
+def frozen_power_slope(blade: BladeAerodynamics, tip_speed_ratio: ArrayLike, pitch: ArrayLike) -> Array:
+    """d(power coefficient)/d(pitch) [1/rad], (n,), with the induced flow held as it was: what a fast change of pitch does before the
+    wake follows. Arguments (n,), pitch in rad."""
+    ratio, theta = (np.asarray(v, float).reshape(-1, 1) for v in (tip_speed_ratio, pitch))
+    r, big_r, cos_cone = blade.radius, blade.rotor_radius, np.cos(blade.cone)
+    normal, in_plane = np.full((len(ratio), len(r)), cos_cone), ratio * r / big_r * cos_cone
+    angle = inflow_angle(blade, normal, in_plane, theta)
+    speed = normal / _balance(blade, _coefficient(blade.lift, angle - blade.twist - theta), angle)[0]
+
+    def power(change: float) -> Array:
+        attack = angle - blade.twist - theta - change
+        lift, drag = (_coefficient(polars, attack) for polars in (blade.lift, blade.drag))
+        driving = blade.chord * speed**2 * (lift * np.sin(angle) - drag * np.cos(angle))
+        return np.asarray(ratio[:, 0] * (driving @ blade.weights[1]) * (3.0 * cos_cone / (np.pi * big_r**3)))
+
+    step = 1e-3
+    return (power(step) - power(-step)) / (2 * step)
+
+
 def thrust_coefficient(blade: BladeAerodynamics, tip_speed_ratio: ArrayLike, pitch: ArrayLike) -> Array:
     """Thrust of the rotor along the shaft in uniform wind by rho/2 A V^2."""
     return rotor_loads(blade, tip_speed_ratio, pitch)[LOAD_NAMES.index("thrust")] * np.cos(blade.cone)

@@ -12,9 +12,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PlainValidator, SerializeAsAny, field_validator, model_validator
 
 from fatigue_runner import shipped
+from fatigue_runner.control.section import ControlSection, control_section
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, known_name, problem, validated
 from fatigue_runner.inputs.source import Source, read_mapping
@@ -132,37 +133,6 @@ class Generator(Section):
     def _regions_of_their_law(self) -> Generator:
         if self.law == "regions" and self.regions is None:
             raise problem("is missing; law: regions needs it", key="regions")
-        return self
-
-
-class Control(Section):
-    """The baseline controller (`control.baseline`): gains at fine pitch, speeds of the high-speed side."""
-
-    rated_speed_rpm: Positive
-    proportional_gain: Positive
-    integral_gain: Positive
-    gain_schedule_pitch_deg: Positive
-    filter_frequency_hz: Positive
-    cut_in_speed_rpm: Positive
-    region_2_speed_rpm: Positive
-    largest_torque: Positive
-    fine_pitch_deg: float = 0.0
-    region_3_pitch_deg: Positive = 1.0
-    region_3_blend_deg: Positive = 0.25
-    saturation_blend_deg: Positive = 0.05
-    unwind_rate: Positive = 10.0
-    unwind_blend: Positive = 0.2
-    torque_blend: Positive = 300.0
-    pitch_rate_limit_deg: Positive = 8.0
-
-    @model_validator(mode="after")
-    def _rising_speeds(self) -> Control:
-        if not self.cut_in_speed_rpm < self.region_2_speed_rpm < self.rated_speed_rpm:
-            raise problem(
-                "speeds must rise from cut_in_speed_rpm over region_2_speed_rpm to rated_speed_rpm; "
-                f"got {self.cut_in_speed_rpm:g}, {self.region_2_speed_rpm:g}, {self.rated_speed_rpm:g}",
-                key="region_2_speed_rpm",
-            )
         return self
 
 
@@ -311,7 +281,7 @@ class TurbineFile(Section):
     nacelle: Nacelle
     drivetrain: Drivetrain
     generator: Generator
-    control: Control | None = None
+    control: Annotated[SerializeAsAny[ControlSection], PlainValidator(control_section)] | None = None
     blade: Blade
     tower: Tower
     sections: Sections | None = None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -23,8 +23,8 @@ from numba.extending import NativeValue, intrinsic, overload, register_model, ty
 from numpy.typing import NDArray
 
 from fatigue_runner.compiled import INLINE, njit
-from fatigue_runner.control import BASELINE
-from fatigue_runner.layout import FAMILIES, PITCH, Layout
+from fatigue_runner.control import Submodel
+from fatigue_runner.layout import DEFAULT_FAMILY, FAMILIES, PITCH, Layout
 from fatigue_runner.turbine.lane_code import LANES
 
 Array = NDArray[np.float64]
@@ -171,8 +171,19 @@ def loads(model, x, wind, control, derivative, out, start, data):
     _loads(model, x, wind, control, derivative, out, start, data)
 
 
-def _models(family: str, prefix: str = "") -> dict[str, Model]:
-    """Every set of equations of one member of the family, by what it takes and has beside the turbine's states."""
+def _prefix(family: str) -> str:
+    """Of the names of its generated modules."""
+    return "" if family == DEFAULT_FAMILY else f"{family}_"
+
+
+def _model(family: str, kind: str, title: str, layout: Layout) -> Model:
+    prefix = _prefix(family)
+    generated = import_module(f"{__package__}.generated.{prefix}{kind}")
+    return Model(f"{family}-{title}" if prefix else title, generated, layout)
+
+
+def _models(family: str) -> dict[str, Model]:
+    """Every set of equations without a controller of one member of the family, by what it takes beside the turbine's states."""
     layout = FAMILIES[family]
     pitched = layout.extended(control=(PITCH,))
     layouts = {
@@ -180,16 +191,15 @@ def _models(family: str, prefix: str = "") -> dict[str, Model]:
         "pitched": ("varying-pitch", pitched),
         "harmonic": ("fixed-pitch-harmonic", layout.extended(harmonics=True)),
         "pitched_harmonic": ("varying-pitch-harmonic", pitched.extended(harmonics=True)),
-        "controlled": ("controlled", layout.extended(first_order=BASELINE.states, harmonics=True)),
     }
-    return {
-        name: Model(
-            f"{family}-{title}" if prefix else title,
-            import_module(f"{__package__}.generated.{prefix}{name}"),
-            own,
-        )
-        for name, (title, own) in layouts.items()
-    }
+    return {kind: _model(family, kind, title, own) for kind, (title, own) in layouts.items()}
 
 
-MODELS = {"t2b1i1cg": _models("t2b1i1cg"), "t2b2cg": _models("t2b2cg", "t2b2cg_")}
+MODELS = {family: _models(family) for family in FAMILIES}
+
+
+@cache
+def controlled(family: str, controller: Submodel) -> Model:
+    """The model under a controller; its generated module is loaded where somebody runs under it."""
+    layout = FAMILIES[family].extended(first_order=controller.states, harmonics=True)
+    return _model(family, f"controlled_{controller.name}", f"controlled-{controller.name}", layout)

@@ -27,7 +27,7 @@ OF_THEIR_OWN_RADIUS = ("thrust", "bending", "flap")
 REACH = (0.7, 1.2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AeroTables:
     """Coefficients by name.
 

@@ -5,20 +5,22 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fatigue_runner.control import baseline
+from fatigue_runner.control import Submodel
+from fatigue_runner.control.section import control_section
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.layout import FAMILIES, HARMONICS, Channel, Layout
+from fatigue_runner.layout import DEFAULT_FAMILY, FAMILIES, HARMONICS, Channel, Layout
 from fatigue_runner.rotor import SQUARE, Rotor
-from fatigue_runner.turbine.dynamics import BASELINE_CONTROLLED, UNCONTROLLED, Dynamics
-from fatigue_runner.turbine.file import Control, check_turbine, mapping_source, read_turbine_file
+from fatigue_runner.turbine.dynamics import CONTROLLED_BY, UNCONTROLLED, Dynamics
+from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turbine_file
 from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters
+from fatigue_runner.turbine.rigid import RigidRotor
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
 
 if TYPE_CHECKING:
@@ -27,11 +29,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-DEFAULT_FAMILY = "t2b1i1cg"
 
 # fixed: the pitch is held, the torque follows the momentary speed; torque-law: the controller's torque at fine pitch; controlled: both
 FIXED, TORQUE_LAW, CONTROLLED = "fixed", "torque-law", "controlled"
 OPERATIONS = (FIXED, TORQUE_LAW, CONTROLLED)
+BEYOND_FINE = 0.1  # rad: a pitch at which the torque is that of region 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,8 @@ class Turbine:
     control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it;
     tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees;
     sections {name: (outer diameter, wall) [m]}: circles whose wear is counted, which change no motion;
-    operating_wind: from cut-in to cut-out [m/s], None where the file does not say.
+    operating_wind: from cut-in to cut-out [m/s], None where the file does not say;
+    generator_efficiency: electrical power over mechanical power.
     """
 
     name: str
@@ -56,6 +59,7 @@ class Turbine:
     family: str = DEFAULT_FAMILY
     sections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     operating_wind: tuple[float, float] | None = None
+    generator_efficiency: float = 1.0
 
     @property
     def layout(self) -> Layout:
@@ -79,42 +83,129 @@ class Turbine:
         return _operated(self, operation)
 
     @property
+    def controller(self) -> Submodel | None:
+        """Who steers; None where the pitch is fixed."""
+        return self.dynamics.controller
+
+    @cached_property
     def control_parameters(self) -> dict[str, float]:
-        """`control.baseline.PARAMETERS` of this operation; none where the pitch is fixed."""
-        if self.operation == FIXED or self.control is None:
+        """The controller's `parameters` in this operation; none where the pitch is fixed."""
+        if self.controller is None or self.control is None:
             return {}
         p = self.parameters
         law = {key: p[key] for key in ("tg_k", "tg_a2", "tg_ws", "tg_p", "tg_t")} | {
             "tg_e": self.control["torque_blend"]
         }
-        return baseline.parameters(self.control, law, self.operation == CONTROLLED)
+        return self.controller.read(self.control, law, self.operation == CONTROLLED)
+
+    def _by_name(self, state: ArrayLike) -> dict[str, Array]:
+        x = np.asarray(state, float)
+        return {name: x[..., i] for i, name in enumerate(self.layout.names)}
 
     def commanded(self, state: ArrayLike) -> dict[str, Array]:
         """Pitch [rad] and generator torque [N m] that the controller makes of states (..., k); empty where the pitch is fixed."""
-        if self.operation == FIXED:
+        if self.controller is None:
             return {}
-        x = np.asarray(state, float)
-        states = {name: x[..., i] for i, name in enumerate(self.layout.names)}
-        return baseline.outputs(states, self.control_parameters, np.sqrt)
+        return self.controller.outputs(self._by_name(state), self.control_parameters, np.sqrt)
+
+    def observed(self, state: ArrayLike) -> dict[str, Array]:
+        """What else a person sees of the controller in states (..., k), by `controller.seen`; empty where the pitch is fixed."""
+        if self.controller is None or self.control is None:
+            return {}
+        limit = float(np.radians(self.control["pitch_rate_limit_deg"]))
+        return self.controller.observed(self._by_name(state), self.control_parameters, limit)
+
+    @property
+    def watched(self) -> dict[str, float]:
+        """What decides channels and not the motion, so that it stands in no hash of the turbine."""
+        limit = (
+            {"pitch_rate_limit_deg": self.control["pitch_rate_limit_deg"]}
+            if self.controller and self.control
+            else {}
+        )
+        return {"generator_efficiency": self.generator_efficiency, **limit}
+
+    @cached_property
+    def rigid(self) -> RigidRotor:
+        """The rotor as its tables have it."""
+        return RigidRotor(self.parameters, self.tables)
+
+    @cached_property
+    def rated_wind(self) -> float | None:
+        """Wind [m/s] at which the rigid rotor reaches the controller's power; None where it never does, or nobody steers."""
+        if self.controller is None:
+            return None
+        fastest = self.controller.speeds(self.control_parameters)[1] / self.gearbox_ratio
+        fine = self._fine_pitch
+        return self.rigid.rated_wind(self._taken(fastest, fine + BEYOND_FINE), fastest, fine)
+
+    @property
+    def pitches(self) -> bool:
+        """Whether a controller turns its blades."""
+        return self.operation == CONTROLLED
+
+    def needed_pitch(self, wind: float) -> float | None:
+        """Pitch [rad] at which the rigid rotor holds its speed in a wind [m/s]; None where the aerodynamic tables end below it.
+
+        Raises InputError where nobody pitches.
+        """
+        if self.controller is None:
+            raise InputError(f"operation {self.operation!r} has no controller that pitches")
+        fine = self._fine_pitch
+        fastest = self.controller.speeds(self.control_parameters)[1] / self.gearbox_ratio
+        if self.rated_wind is None or wind < self.rated_wind:
+            return fine
+        return self.rigid.pitch_for(self._taken(fastest, fine + BEYOND_FINE), wind, fastest, fine)
+
+    @property
+    def _fine_pitch(self) -> float:
+        return float(np.radians(self.control["fine_pitch_deg"])) if self.control else 0.0
 
     def guesses(self, wind: float) -> tuple[list[tuple[float, Array]], float]:
         """Where a search for steady rotation starts: see `steady.Equations`.
 
         From the fastest rotation down, so that the point right of the power maximum is found, not the stalled one; under a controller
-        not faster than it holds, and no rotation that its cut-in is above.
+        first where the rigid rotor is in balance, not faster than it holds, and no rotation that its cut-in is above.
         """
-        radius = self.parameters["radius"]
-        none = np.zeros(len(self.layout.first_order))
-        if self.operation == FIXED:
+        radius, controller = self.parameters["radius"], self.controller
+        if controller is None:
+            none = np.zeros(len(self.layout.first_order))
             ratios = (7.5, 9.0, 6.0, 5.0, 10.5, 4.0, 3.0, 12.0)
             return [(ratio * wind / radius, none) for ratio in ratios], 0.02
-        control, gearbox = self.control_parameters, self.gearbox_ratio
-        found = []
-        for integral in baseline.INTEGRALS:
-            for ratio in (7.5, 9.0, 12.0, 14.0, 6.0, 5.0):
-                speed = min(ratio * wind / radius, control["ctl_rated"] / gearbox)
-                found.append((speed, np.array([gearbox * speed, integral])))
-        return found, 0.9 * control["ctl_cut_in"] / gearbox
+        p, gearbox = self.control_parameters, self.gearbox_ratio
+        slowest, fastest = (speed / gearbox for speed in controller.speeds(p))
+        pairs = [self._balance(wind, slowest, fastest)]
+        for pitch in np.radians((0.0, 2.0, 5.0, 9.0, 13.0, 17.0, 21.0, 25.0)):
+            pairs += [(min(r * wind / radius, fastest), pitch) for r in (7.5, 9.0, 12.0, 14.0, 6.0, 5.0)]
+        found = [
+            (speed, np.array(controller.start(p, gearbox * speed, self._fine_pitch + beyond)))
+            for speed, beyond in pairs
+        ]
+        return found, slowest
+
+    def _balance(self, wind: float, slowest: float, fastest: float) -> tuple[float, float]:
+        """Rotor speed [rad/s] and pitch beyond fine [rad] at which the rigid rotor gives the power that the controller takes."""
+        fine = self._fine_pitch
+        speeds = np.linspace(slowest, fastest, 200)
+        surplus = self.rigid.power(wind, speeds, fine) - np.array(
+            [self._taken(speed, fine) for speed in speeds]
+        )
+        if surplus[-1] > 0 and self.operation == CONTROLLED:
+            pitch = self.rigid.pitch_for(self._taken(fastest, fine + BEYOND_FINE), wind, fastest, fine)
+            return fastest, (pitch or fine) - fine
+        gives = np.flatnonzero(surplus > 0)
+        return float(speeds[gives[-1]] if len(gives) else slowest), 0.0
+
+    def _taken(self, speed: float, pitch: float) -> float:
+        """Power [W] that the controller takes from a steady rotor."""
+        assert self.controller is not None
+        generator = self.gearbox_ratio * speed
+        states = {"generator_speed": generator, **dict.fromkeys(self.layout.names, 0.0)}
+        own = self.controller.start(self.control_parameters, generator, pitch)
+        states |= dict(zip(self.controller.names, own, strict=True))
+        return float(
+            generator * self.controller.outputs(states, self.control_parameters, np.sqrt)["generator_torque"]
+        )
 
     @property
     def hash(self) -> str:
@@ -206,11 +297,18 @@ class Turbine:
         rows = np.zeros((len(blown), self.layout.wind_size(known)))
         rows[:, self.layout.wind_rows(known)] = blown
         harmonics = self.layout.beyond(known)
-        if self.operation != FIXED:
-            angle = np.asarray(0.0)
+        turned = angle
+        if self.controller is not None:
+            angle, turned = np.asarray(0.0), self.commanded(x)["pitch"]
         if angle.ndim:
-            return load_channels(self.pitched_kernel_data(harmonics), x, rows, angle[:, None])
-        return load_channels(self.kernel_data(float(angle), harmonics), x, rows)
+            found = load_channels(self.pitched_kernel_data(harmonics), x, rows, angle[:, None])
+        else:
+            found = load_channels(self.kernel_data(float(angle), harmonics), x, rows)
+        mechanical = found["generator_torque"] * x[:, self.layout.generator_speed]
+        return found | {
+            "generator_power": self.generator_efficiency * mechanical,
+            "blade_pitch": np.broadcast_to(turned, len(x)).astype(float),
+        }
 
     def operating_point(
         self,
@@ -243,7 +341,11 @@ class Turbine:
 
 @lru_cache(maxsize=64)
 def _operated(turbine: Turbine, operation: str) -> Turbine:
-    dynamics = (UNCONTROLLED if operation == FIXED else BASELINE_CONTROLLED)[turbine.family]
+    dynamics = UNCONTROLLED[turbine.family]
+    if turbine.control is not None and operation != FIXED:
+        name = turbine.control["controller"]
+        behind_actuator = turbine.control["actuator"] is not None and operation == CONTROLLED
+        dynamics = CONTROLLED_BY[turbine.family][f"{name}_actuator" if behind_actuator else name]
     return replace(turbine, operation=operation, dynamics=dynamics)
 
 
@@ -296,10 +398,16 @@ def _data_for_every_pitch(turbine: Turbine, model: Model) -> KernelData:
     return KernelData(
         model=model,
         constants=kernel.constants({**turbine.parameters, **turbine.control_parameters}),
-        tables=turbine.tables.pitched_cells(kernel.TABLES[: kernel.EQUATION_TABLES]),
-        load_tables=turbine.tables.pitched_cells(kernel.TABLES),
+        tables=_pitched_cells(turbine.tables, kernel.TABLES[: kernel.EQUATION_TABLES]),
+        load_tables=_pitched_cells(turbine.tables, kernel.TABLES),
         cells=len(turbine.tables.tip_speed_ratio) - 1,
     )
+
+
+@lru_cache(maxsize=8)
+def _pitched_cells(tables: AeroTables, names: tuple[str, ...]) -> Array:
+    """Made once for all modes of operation and gains of a turbine: seconds otherwise."""
+    return tables.pitched_cells(names)
 
 
 def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
@@ -338,7 +446,7 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
         _check_inputs(path, data)
     # a law without regions has no rated speed that a pitch could hold
     given = data.get("control") if data["generator"]["law"] == "regions" else None
-    control = Control.model_validate(given).model_dump() if given else None
+    control = _control(given, data, parameters, tables) if given else None
     tower = tuple((float(height), float(diameter)) for height, diameter in data["tower"].get("diameters", ()))
     sections = {
         where: (float(circle["diameter"]), float(circle["wall"]))
@@ -349,7 +457,23 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     return Turbine(
         name, parameters, tables, description, UNCONTROLLED[family], control, tower=tower, family=family,
         sections=sections, operating_wind=None if wind is None else (float(wind[0]), float(wind[1])),
+        generator_efficiency=float(data["generator"].get("efficiency", 1.0)),
     )  # fmt: skip
+
+
+def _control(
+    given: Mapping[str, Any], data: Mapping[str, Any], parameters: Mapping[str, float], tables: AeroTables
+) -> dict[str, Any]:
+    """The `control` section with its defaults and, where it says `tuning`, the gains that follow."""
+    section = control_section(given).model_dump()
+    if section["tuning"] is None:
+        return section
+    from fatigue_runner.turbine.design import designed_gains
+
+    try:
+        return section | designed_gains(section, data, RigidRotor(parameters, tables))
+    except InputError as error:
+        raise InputError(f"turbine {data.get('name', '?')}: control: tuning: {error}") from None
 
 
 def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:

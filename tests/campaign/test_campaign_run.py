@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 
 from fatigue_runner.campaign import CampaignInterrupted, run_campaign
 from fatigue_runner.campaign.plan import make_plan
-from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES
+from fatigue_runner.channels import FATIGUE_CHANNELS
 from fatigue_runner.errors import InputError
 from fatigue_runner.fatigue import damage_equivalent_load, short_term_cycles
 from fatigue_runner.logbook import read_log
@@ -80,8 +80,8 @@ def test_the_csv_has_the_columns_in_order_and_empty_cells_for_the_unknown(world,
         rows = list(reader)
     assert reader.fieldnames == columns(FATIGUE_CHANNELS, [3, 4, 5, 10, 12])
     assert reader.fieldnames[:3] == ["case_id", "wind_source", "wind_speed"]
-    figures = ("mean", "min", "max", "min_time", "max_time")
-    assert reader.fieldnames[-5:] == [f"{name}_{LOAD_NAMES[-1]}" for name in figures]
+    figures = ("mean", "min", "max", "std", "min_time", "max_time")
+    assert reader.fieldnames[-6:] == [f"{name}_rotor_speed" for name in figures]
     assert rows[0]["nrmse_max"] == rows[0]["corrector"] == rows[0]["delta_t"] == ""
     assert "nan" not in (out / "results.csv").read_text()
     assert float(rows[1]["nrmse_max"]) == results.rows[1]["nrmse_max"]

@@ -126,8 +126,11 @@ def test_a_gust_is_pitched_away_and_the_speed_comes_back(turbine):
     rpm, pitch = run.state[:, 14] / RPM, np.degrees(run.pitch)
     assert 12.5 < rpm.max() < 13.8 and pitch.max() > 16.5
     assert rpm[-50:] == pytest.approx(12.1, abs=0.05)
-    assert set(run.control) == {"filtered_generator_speed", "speed_error_integral"}
-    assert np.abs(np.diff(pitch) / 0.1).max() < 8.0
+    seen = {"pitch_rate", "pitch_rate_limited", "torque_region"}
+    assert set(run.control) == {"filtered_generator_speed", "speed_error_integral"} | seen
+    rate = np.degrees(run.control["pitch_rate"])
+    assert rate == pytest.approx(np.gradient(pitch, run.time), abs=0.05) and np.abs(rate).max() < 8.0
+    assert not run.control["pitch_rate_limited"].any() and set(run.control["torque_region"]) == {3.0}
 
 
 # Every method and mode

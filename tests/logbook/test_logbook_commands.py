@@ -10,6 +10,7 @@ import pytest
 from logbook_example import ATTACHMENTS, RESULT, RUN, example, same_bits
 from typer.testing import CliRunner
 
+from fatigue_runner.channels import LOAD_NAMES
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.logbook import LogError, check, export, is_complete, summarise, write_log
 from fatigue_runner.logbook.commands import app
@@ -179,7 +180,7 @@ def test_parquet_holds_every_channel_to_the_bit_with_its_unit(log_path, tmp_path
     parquet = pytest.importorskip("pyarrow.parquet")
     names = export(log_path, None, tmp_path / "a.parquet")
     table = parquet.read_table(tmp_path / "a.parquet")
-    assert table.column_names == names and len(names) == 1 + 16 + 19 + 3 + 4
+    assert table.column_names == names and len(names) == 1 + 16 + len(LOAD_NAMES) + 3 + 4
     assert same_bits(table["rotor_thrust"].to_numpy(), example().loads["rotor_thrust"])
     assert table.schema.field("rotor_thrust").metadata[b"unit"] == b"N"
 

@@ -7,7 +7,7 @@ import io
 
 import pytest
 
-from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
+from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES, STATES, Channel
 from fatigue_runner.errors import InputError
 from fatigue_runner.results import Results, read_results
 from fatigue_runner.results.columns import DESCRIPTION, INTEGRATOR, WIND, columns, fatigue_keys, table
@@ -40,8 +40,15 @@ def test_states_loads_and_exponents_have_their_columns():
     ]
     for _, _, suffix in fatigue_keys(FATIGUE_CHANNELS, [3.0, 10.0]):
         assert {f"del_{suffix}", f"del_error_{suffix}", f"damage_ratio_{suffix}"} <= set(names)
-    figures = ("mean", "min", "max", "min_time", "max_time")
-    assert names[-5 * len(LOAD_NAMES) :] == [f"{f}_{load}" for load in LOAD_NAMES for f in figures]
+    figures = ("mean", "min", "max", "std", "min_time", "max_time")
+    ours = [f"{f}_{name}" for name in (*LOAD_NAMES, "rotor_speed") for f in figures]
+    assert names[-len(ours) :] == ours
+
+
+def test_a_controller_s_states_have_errors_of_their_own():
+    own = Channel("filtered_generator_speed", "rad/s", "filtered generator speed", "rpm")
+    names = columns(FATIGUE_CHANNELS, [3.0], (*STATES, own))
+    assert "nrmse_filtered_generator_speed" in names and len(set(names)) == len(names)
 
 
 def written(folder, rows):

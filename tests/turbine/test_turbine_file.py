@@ -25,6 +25,23 @@ def refusal(folder: Path, text: str, head: str = HEAD) -> str:
 
 # what stands below the two lines of HEAD, and what is said
 REFUSED = {
+    "unknown key of the controller": (
+        "control:\n  integral_gian: 0.1",
+        "mine.yaml:4: unknown key 'integral_gian' in control; did you mean 'integral_gain'?",
+    ),
+    "another controller": ("control: {controller: basline}", "mine.yaml:3: control.controller: 'basline' is not known; did you mean 'base"),
+    "negative gain": ("control:\n  proportional_gain: -0.1", "mine.yaml:4: control.proportional_gain must be above 0; got -0.1"),
+    "gain that is taken away": (
+        "control:\n  integral_gain: null",
+        "mine.yaml:4: control.integral_gain: is missing; give it, or `tuning`, from which all gains follow",
+    ),
+    "speeds that fall": ("control:\n  region_2_speed_rpm: 600", "mine.yaml:4: control.region_2_speed_rpm: speeds must rise"),
+    "half an actuator": ("control:\n  actuator: {damping_ratio: 0.7}", "mine.yaml:4: key 'natural_frequency' is missing in control.act"),
+    "an actuator that drives itself": (
+        "control:\n  actuator: {natural_frequency: 6, damping_ratio: -1}",
+        "mine.yaml:4: control.actuator.damping_ratio must be above 0; got -1",
+    ),
+    "a wake of no kind": ("control:\n  tuning: {wake: frosen}", "mine.yaml:4: control.tuning.wake: 'frosen' is not known; did"),
     "unknown section": ("towr: {mass_factor: 2}", "mine.yaml:3: unknown key 'towr'; did you mean 'tower'?"),
     "unknown key": (
         "tower:\n  mas_factor: 2",

@@ -1,4 +1,5 @@
-"""What limits the result: lost cases, clamped look-ups, winds that a corrector does not know, missing references. Before the figures."""
+"""What limits the result, before the figures: lost cases, clamped look-ups, a pitch faster than its limit, winds that a corrector does not
+know, missing references."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from typing import Any
 from fatigue_runner.report.blocks import Section, Warnings
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.results.cells import Row, format_percent, number, text
+from fatigue_runner.results.operation import pitch_rate_sentences
 from fatigue_runner.results.ranking import unseen_winds
 
 ORDER = 20
@@ -16,7 +18,13 @@ SHORT = 600.0  # s; the length of a load case in IEC 61400-1
 
 def build(run: Run) -> Section | None:
     """The warnings of this run; None where there are none."""
-    items = [*_clamped(run), *_lost(run), *unseen_winds(run.summaries), *_uncompared(run)]
+    items = [
+        *_clamped(run),
+        *pitch_rate_sentences(run.rows),
+        *_lost(run),
+        *unseen_winds(run.summaries),
+        *_uncompared(run),
+    ]
     items += [*_unresolved(run), *_short(run), *_folder(run)]
     return Section("What limits this result", [Warnings(items)]) if items else None
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
-from fatigue_runner.channels import LOAD_NAMES
-from fatigue_runner.control import BASELINE
+from fatigue_runner.channels import EQUATION_LOADS
+from fatigue_runner.control import SUBMODELS
 from fatigue_runner.control import Submodel as Controller
 from fatigue_runner.layout import FAMILIES, T2B1I1CG, Layout
 from fatigue_runner.layout import PITCH as PITCH_SIGNAL
@@ -291,7 +291,7 @@ def module(variant: Variant) -> str:
     out = dict(enumerate(variant.states.symbols(1))) | {
         layout.freedoms + i: a for i, a in enumerate(accelerations)
     }
-    load_out = {i: loads[n] for i, n in enumerate(LOAD_NAMES)}
+    load_out = {i: loads[n] for i, n in enumerate(EQUATION_LOADS)}
     if variant.varying_pitch:
         sheet, out = with_varying_pitch(sheet, out)
         load_sheet, load_out = with_varying_pitch(load_sheet, load_out)
@@ -321,7 +321,7 @@ def module(variant: Variant) -> str:
     ]  # fmt: skip
     head = HEAD.format(
         doc=variant.doc, source=variant.source, parameters=repr(variant.parameters), tables=repr(variant.tables),
-        width=variant.equation_tables, loads=repr(LOAD_NAMES), turned=" at zero pitch" if variant.varying_pitch else "",
+        width=variant.equation_tables, loads=repr(EQUATION_LOADS), turned=" at zero pitch" if variant.varying_pitch else "",
     )  # fmt: skip
     lines = [f"    {name} = p[{name!r}]" for name in variant.parameters]
     lines += [f"    {s} = {PRINT(e)}" for s, e in definitions.items()]
@@ -352,13 +352,6 @@ def _variants(family: str) -> dict[str, Variant]:
             equations,
             layout.extended(harmonics=True),
         ),
-        "controlled": Variant(
-            "The lane kernels with the baseline controller's states, pitch and torque, under wind with azimuthal harmonics",
-            f"{pitching}, and fatigue_runner/control/baseline.py",
-            layout.extended(first_order=BASELINE.states, harmonics=True),
-            varying_pitch=True,
-            controller=BASELINE,
-        ),
         "pitched_harmonic": Variant(
             "The lane kernels with each lane's pitch [rad] as a control signal, under wind with azimuthal harmonics",
             pitching,
@@ -366,6 +359,14 @@ def _variants(family: str) -> dict[str, Variant]:
             varying_pitch=True,
         ),
     }
+    for controller in SUBMODELS:
+        made[f"controlled_{controller.name}"] = Variant(
+            f"The lane kernels with states, pitch and torque of the controller `{controller.name}`, under wind with azimuthal harmonics",
+            f"{pitching}, and fatigue_runner/control",
+            layout.extended(first_order=controller.states, harmonics=True),
+            varying_pitch=True,
+            controller=controller,
+        )
     what = "." if not prefix else ", each blade with an edge mode of its own."
     return {
         f"{prefix}{name}": replace(v, doc=v.doc + what, states=_STATES[family]) for name, v in made.items()
