@@ -89,6 +89,10 @@ def overview(cases: Sequence[Viewed]) -> rrb.Container:
     ]
     if len(cases) == 1:
         solver, shares = _solver_plots(cases)[:3], [3.0, 3.0]
+        if cases[0].log.control:
+            paths = ["state/rotor_speed", "load/blade_pitch"]
+            plots.append(_plot("Rotor speed [rpm] and blade pitch [deg]", cases, paths))
+            shares.append(2.4)
         plots += solver
         shares += [1.6 if place == 0 and cases[0].is_guarded else 2.4 for place in range(len(solver))]
         while len(plots) < 4:
@@ -237,6 +241,8 @@ def _all_states(cases: Sequence[Viewed]) -> rrb.Grid:
             continue
         label = f"{_blade_free(channel.label, len(cases) == 1)} [{channel.read_unit}]"
         groups.setdefault(label, []).append(f"state/{channel.name}")
+    for channel in dict.fromkeys(channel for case in cases for channel in case.log.control_signals):
+        groups[f"{channel.label} [{channel.read_unit}]"] = [f"control/{channel.name}"]
     views = [_plot(label, cases, paths) for label, paths in groups.items()]
     return rrb.Grid(*views, *_all_wind(cases), name="States and wind")
 

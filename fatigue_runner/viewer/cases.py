@@ -166,7 +166,7 @@ def check_turbine(path: Path, log: Log, shape: Geometry) -> None:
     if not all(name in log.loads for name in names):
         return
     logged = np.stack([log.loads[name] for name in names], axis=1)
-    drawn = shape.tip_channels(log.state).reshape(len(logged), 6)
+    drawn = shape.tip_channels(log.state, log.pitch if len(log.pitch) else None).reshape(len(logged), 6)
     known = np.isfinite(logged) & np.isfinite(drawn)
     if known.any() and np.abs(np.where(known, logged - drawn, 0.0)).max() > 1e-3:
         raise InputError(

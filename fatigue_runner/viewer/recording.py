@@ -167,7 +167,8 @@ class Stage:
             wind_scene.send_numbers(self._columns, case, root, slow)
 
     def _send_turbine(self, case: Viewed, frames: np.ndarray) -> None:
-        pose = case.geometry.pose(case.log.state[frames], case.skin.radius, TOWER_LEVELS, self.scale)
+        pitch = case.log.pitch[frames] if len(case.log.pitch) else None
+        pose = case.geometry.pose(case.log.state[frames], case.skin.radius, TOWER_LEVELS, self.scale, pitch)
         time, root = case.log.time[frames], f"scene/{case.key}"
         tower = shapes.tower_vertices(pose)
         self._mesh(f"{root}/tower", time, tower, shapes.tower_triangles(TOWER_LEVELS))
@@ -212,6 +213,9 @@ class Stage:
                 self._series(f"plots/wind/{channel.name}/{case.key}", time, log.wind[index, place])
             for channel, values in zip(BLADE_WIND, wind_scene.wind_of_blades(case, index).T, strict=True):
                 self._series(f"plots/wind/{channel.name}/{case.key}", time, values)
+        for channel in log.control_signals:
+            values = log.control[channel.name][index] * channel.scale
+            self._series(f"plots/control/{channel.name}/{case.key}", time, values)
         for name, values in log.loads.items():
             self._series(f"plots/load/{name}/{case.key}", time, values[index] * read_unit(name)[1])
         self._send_solver(case, rows, stride)

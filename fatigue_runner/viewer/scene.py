@@ -32,7 +32,8 @@ class Pose:
     """Where the turbine is at n times, [m], in the axes of the module.
 
     tower (n, levels, 3); top and apex (n, 3); nacelle and rotor (n, 3, 3): columns are the axes of frames N and F; blades
-    (n, 3, stations, 3): the deflected pitch axes; coned (n, 3, 3, 3): of each blade, columns are e1, e2, e3 of its coned axes.
+    (n, 3, stations, 3): the deflected pitch axes; coned (n, 3, 3, 3): of each blade, columns are e1, e2, e3 of its coned axes; pitch
+    (n,) [rad].
     """
 
     tower: Array
@@ -42,6 +43,7 @@ class Pose:
     rotor: Array
     blades: Array
     coned: Array
+    pitch: Array
 
 
 @dataclass(frozen=True)
@@ -74,17 +76,19 @@ class Geometry:
         """Height of the rotor's apex at rest above the tower base [m]."""
         return self.tower.length + self.tower_to_shaft + self.overhang * sin(self.tilt)
 
-    def modes_at(self, radius: Array) -> tuple[Array, Array]:
-        """Flap and edge displacements (stations, 2) along e1, e2 per unit modal coordinate, turned with the pitch."""
-        c, s = cos(self.pitch), sin(self.pitch)
-        turn = np.array([[c, s], [-s, c]])
-        return self.blade.flap_at(radius) @ turn.T, self.blade.edge_at(radius) @ turn.T
+    def deflection(
+        self, state: Array, radius: Array, scale: float = 1.0, pitch: Array | None = None
+    ) -> Array:
+        """Displacement of the blades along e1, e2, e3 (n, 3, stations, 3) [m] for states (n, rows of the layout).
 
-    def deflection(self, state: Array, radius: Array, scale: float = 1.0) -> Array:
-        """Displacement of the blades along e1, e2, e3 (n, 3, stations, 3) [m] for states (n, rows of the layout)."""
-        flap, edge = self.modes_at(radius)
+        pitch (n,) [rad], None where it is the geometry's: the modes turn with it.
+        """
+        flap, edge = self.blade.flap_at(radius), self.blade.edge_at(radius)
         f, e = (scale * self._of_blades(state, name)[..., None] for name in ("flap", "edge"))
-        across = f[..., None] * flap + e[..., None] * edge
+        straight = f[..., None] * flap + e[..., None] * edge
+        angle = np.broadcast_to(self.pitch if pitch is None else pitch, len(state))[:, None, None]
+        c, s, x, y = np.cos(angle), np.sin(angle), straight[..., 0], straight[..., 1]
+        across = np.stack([c * x + s * y, c * y - s * x], axis=-1)
         shortening = [np.interp(radius, self.blade.grid, column) for column in self.blade.shortening.T]
         along = -(shortening[0] * f**2 + 2 * shortening[1] * f * e + shortening[2] * e**2) / 2
         return np.concatenate([across, along[..., None]], axis=-1)
@@ -96,8 +100,12 @@ class Geometry:
         first = self.layout.row(f"blade1_{mode}")
         return state[:, first : first + BLADES]
 
-    def pose(self, state: Array, radius: Array, levels: int = 9, scale: float = 1.0) -> Pose:
+    def pose(
+        self, state: Array, radius: Array, levels: int = 9, scale: float = 1.0, pitch: Array | None = None
+    ) -> Pose:
         """Place all parts for states (n, rows of the layout); blades at the distances `radius` from the apex [m].
+
+        pitch (n,) [rad], None where it is the geometry's.
 
         Raises InputError for states of another shape.
         """
@@ -119,10 +127,11 @@ class Geometry:
         rotor = shaft @ rotation_x(state[:, self.layout.rotor])
         place = rotation_x(_AROUND) @ rotation_y(np.full(BLADES, self.cone))
         coned = rotor[:, None] @ place
-        local = self.deflection(state, radius, scale)
+        local = self.deflection(state, radius, scale, pitch)
         local[..., 2] += radius
         blades = apex[:, None, None] + np.einsum("nbij,nbkj->nbki", coned, local)
-        return Pose(tower, tower[:, -1], nacelle, apex, rotor, blades, coned)
+        turned = np.broadcast_to(self.pitch if pitch is None else pitch, len(state))
+        return Pose(tower, tower[:, -1], nacelle, apex, rotor, blades, coned, turned)
 
     def _tower(self, a: Array, s: Array, heights: Array) -> Array:
         """Points of the tower's axis (n, levels, 3)."""
@@ -138,9 +147,9 @@ class Geometry:
         span = np.array([self.blade.hub_radius, self.blade.tip_radius])
         return place[:, None, :, 2] * span[:, None]
 
-    def tip_channels(self, state: Array) -> Array:
-        """(n, 3, 2) out-of-plane and in-plane tip deflections, as the load channels of a log [m]."""
-        return self.deflection(state, np.array([self.blade.tip_radius]))[:, :, 0, :2]
+    def tip_channels(self, state: Array, pitch: Array | None = None) -> Array:
+        """(n, 3, 2) out-of-plane and in-plane tip deflections, as the load channels of a log [m]; pitch as in `deflection`."""
+        return self.deflection(state, np.array([self.blade.tip_radius]), pitch=pitch)[:, :, 0, :2]
 
 
 def geometry(turbine: Mapping[str, Any], pitch: float = 0.0) -> Geometry:

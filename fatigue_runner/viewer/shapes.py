@@ -29,7 +29,7 @@ _TOWER_SIDES = 10
 
 @dataclass(frozen=True)
 class BladeSkin:
-    """radius (m,): distances from the apex [m]; outline (m, 6, 2): points of the sections along e1, e2 [m]."""
+    """radius (m,): distances from the apex [m]; outline (m, 6, 2): points of the sections along e1, e2 at zero pitch [m]."""
 
     radius: Array
     outline: Array
@@ -40,7 +40,10 @@ class BladeSkin:
 
     def vertices(self, pose: Pose) -> NDArray[np.float32]:
         """(n, 3, m * 6, 3) of the blades of a pose that was made at `radius`."""
-        e1, e2 = pose.coned[..., 0], pose.coned[..., 1]
+        # the sections turn with the pitch about the span: their axes do
+        c, s = (f(pose.pitch)[:, None, None] for f in (np.cos, np.sin))
+        across, along = pose.coned[..., 0], pose.coned[..., 1]
+        e1, e2 = c * across - s * along, s * across + c * along
         around = (
             self.outline[None, None, :, :, 0, None] * e1[:, :, None, None]
             + self.outline[None, None, :, :, 1, None] * e2[:, :, None, None]
@@ -70,7 +73,7 @@ def blade_skin(turbine: Mapping[str, Any], geometry: Geometry) -> BladeSkin:
     across = (
         round_part[:, None] * _CIRCLE[:, 1] + (1 - round_part[:, None]) * thickness[:, None] * _AIRFOIL[:, 1]
     )
-    angle = np.radians(twist) + geometry.pitch
+    angle = np.radians(twist)
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     # The chord points to the trailing edge: (sin, cos) along e1, e2, so that twist turns the leading edge upwind.
     outline = np.stack([along * s - across * c, along * c + across * s], axis=-1) * chord[:, None, None]

@@ -81,7 +81,8 @@ def send_arrows(
     scale: times true deflection.
     """
     span = np.array([SPAN * case.geometry.radius])
-    ends = case.geometry.pose(case.log.state[frames], span, scale=scale).blades[:, :, 0]
+    pitch = case.log.pitch[frames] if len(case.log.pitch) else None
+    ends = case.geometry.pose(case.log.state[frames], span, scale=scale, pitch=pitch).blades[:, :, 0]
     vectors = np.zeros_like(ends)
     vectors[..., 0] = ARROW_SCALE * np.nan_to_num(wind_of_blades(case, frames))
     vectors[..., 1:] = ARROW_SCALE * np.nan_to_num(wind_across(case, frames))[:, None]

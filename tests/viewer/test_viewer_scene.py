@@ -141,6 +141,33 @@ def test_blade_skin_has_the_turbine_file_s_chord_across_the_pitch_axis():
     assert chord[0] > 0  # twist to feather turns the leading edge upwind, so the trailing edge lies downwind
 
 
+def test_blades_turn_about_their_span_with_the_pitch_of_the_log():
+    """A quarter of a turn to feather: the chord, which lies across the wind at the tip, points downwind."""
+    skin = shapes.blade_skin(read_turbine_file("nrel5mw"), shape())
+    fine, feathered = (
+        skin.vertices(shape().pose(state(), skin.radius, pitch=np.array([angle])))[0, 0].reshape(
+            len(skin.radius), -1, 3
+        )
+        for angle in (0.0, np.pi / 2)
+    )
+    chords = [blade[-3, 3] - blade[-3, 0] for blade in (fine, feathered)]
+    assert abs(chords[0][0]) < 0.15 * np.linalg.norm(chords[0]) and chords[1][0] > 0.95 * np.linalg.norm(
+        chords[1]
+    )
+    assert np.allclose(fine.mean(axis=1)[-3], feathered.mean(axis=1)[-3], atol=0.5)
+
+
+def test_tips_of_a_run_under_control_are_where_its_log_says(nrel5mw):
+    from fatigue_runner import simulate
+
+    run = simulate(nrel5mw, 17.0, "rk4", 0.05, 2.0, operation="controlled")
+    drawn = shape().tip_channels(run.state, run.pitch)
+    assert np.degrees(run.pitch.min()) > 10
+    for i in (1, 2, 3):
+        assert drawn[:, i - 1, 0] == pytest.approx(run.loads[f"blade{i}_tip_out_of_plane"], abs=1e-6)
+        assert drawn[:, i - 1, 1] == pytest.approx(run.loads[f"blade{i}_tip_in_plane"], abs=1e-6)
+
+
 def test_skins_are_closed_to_the_last_ring_and_use_every_vertex():
     for vertices, triangles in (shapes.hub_skin(shape()), shapes.nacelle_skin(shape())):
         assert set(triangles.ravel()) == set(range(len(vertices)))
