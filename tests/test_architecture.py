@@ -80,7 +80,7 @@ ONLY_IN = {
     "torch": {"corrector"},
     "rerun": {"viewer"},
     "sympy": {"turbine"},
-    "matplotlib": {"report", "benchmark"},
+    "matplotlib": {"report", "benchmark", "integrators"},
     "mcap": {"logbook", "benchmark"},
     "mcap_protobuf": {"logbook", "benchmark"},
     "joblib": {"campaign", "corrector", "benchmark"},

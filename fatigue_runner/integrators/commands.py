@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -21,6 +22,12 @@ def turbine(
         typer.Option("--wind", "-w", help="Wind speed [m/s]; may be repeated. Default 6, 8, 10."),
     ] = None,
     pitch: Annotated[float, typer.Option("--pitch", help="Blade pitch [deg], positive to feather.")] = 0.0,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot", help="Draw the operating curves under the controller into this file (.png, .svg, .pdf)."
+        ),
+    ] = None,
     write_tables: Annotated[
         bool,
         typer.Option(
@@ -28,7 +35,7 @@ def turbine(
         ),
     ] = False,
 ) -> None:
-    """Show a turbine: masses, power coefficient, operating points, natural frequencies, stability limits.
+    """Show a turbine: masses, power coefficient, operating points, natural frequencies, stability limits, operation from cut-in to cut-out.
 
     Examples:
 
@@ -37,6 +44,8 @@ def turbine(
         fatigue-runner turbine t2b1i1cg --wind 8 --wind 11
 
         fatigue-runner turbine my-turbine.yaml --write-tables
+
+        fatigue-runner turbine nrel5mw --plot operation.png
     """
     to = console()
     if write_tables:
@@ -45,4 +54,4 @@ def turbine(
         to.print(f"wrote {make_tables(name)}")
     from fatigue_runner.integrators.turbine_tables import print_turbine
 
-    print_turbine(name, wind or [6.0, 8.0, 10.0], pitch, to)
+    print_turbine(name, wind or [6.0, 8.0, 10.0], pitch, to, plot)

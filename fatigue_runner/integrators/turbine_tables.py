@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fatigue_runner.channels import BY_NAME
+from fatigue_runner.errors import InputError
 from fatigue_runner.integrators.methods import METHODS
+from fatigue_runner.integrators.operating_curves import CHANNELS, draw, operating_curves, revolution, winds_of
 from fatigue_runner.integrators.stability import stability_limit
 from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.beam import blade_modes, tower_modes
 from fatigue_runner.turbine.file import read_turbine_file
+from fatigue_runner.turbine.loop import check_loop, speed_mode
+from fatigue_runner.turbine.turbine import CONTROLLED
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -21,11 +26,14 @@ if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
 
 
-def print_turbine(name: str, winds: Sequence[float], pitch_deg: float, console: Console) -> None:
-    """Masses, power coefficient, operating points, frequencies and stability limits of a turbine.
+def print_turbine(
+    name: str, winds: Sequence[float], pitch_deg: float, console: Console, plot: Path | None = None
+) -> None:
+    """Masses, power coefficient, operating points, frequencies and stability limits of a turbine, and how it operates under its controller.
 
-    name: shipped turbine or path; winds [m/s]; pitch_deg: positive to feather.
-    Raises InputError for an unknown turbine, and for a wind or a pitch without steady rotation.
+    name: shipped turbine or path; winds [m/s]; pitch_deg: positive to feather; plot: a file for the operating curves.
+    Raises InputError for an unknown turbine, for a wind or a pitch without steady rotation, for a controller that makes the turbine
+    unstable, and for a plot of a turbine that has none.
     """
     turbine = load_turbine(name)
     pitch = float(np.deg2rad(pitch_deg))
@@ -35,6 +43,58 @@ def print_turbine(name: str, winds: Sequence[float], pitch_deg: float, console: 
     console.print(_operating_points(turbine, winds, pitch))
     console.print(_frequencies(turbine, winds, pitch))
     console.print(_stability(turbine))
+    if turbine.control is not None:
+        _print_operation(turbine.operated(CONTROLLED), console, plot)
+    elif plot is not None:
+        raise InputError(
+            f"turbine {turbine.name} has no `control` section, so that there are no operating curves; leave --plot out"
+        )
+
+
+def _print_operation(turbine: Turbine, console: Console, plot: Path | None) -> None:
+    """Gains, operating points and the speed loop; the drawing where a file for it is given."""
+    check_loop(turbine)
+    winds = winds_of(turbine)
+    curves = operating_curves(turbine, winds)
+    console.print(_operation(turbine, winds, curves))
+    if plot is not None:
+        draw(turbine.name, winds, curves, plot)
+        console.print(f"wrote {plot}", soft_wrap=True)
+
+
+def _operation(turbine: Turbine, winds: Sequence[float], curves: Mapping[str, Any]) -> Table:
+    names = [name for name in CHANNELS if name not in _NOT_PRINTED]
+    headings = [f"{_SHORT.get(name, BY_NAME[name].label)}, {BY_NAME[name].read_unit}" for name in names]
+    table = _plain_table("Operation under the controller", "wind, m/s", *headings, "speed loop, Hz (damping)")
+    for place, wind in enumerate(winds):
+        values = [_figure(curves[name][place] * BY_NAME[name].scale) for name in names]
+        mode = speed_mode(turbine, wind) if turbine.rated_wind and wind > turbine.rated_wind else None
+        told = "" if mode is None else f"{mode.frequency / (2 * np.pi):.3f} ({mode.damping:.2f})"
+        table.add_row(f"{wind:g}", *values, told)
+    control = turbine.control or {}
+    gains = ", ".join(f"{key} {control[key]:.5g}" for key in _GAINS if control.get(key) is not None)
+    source = "from `tuning`" if control.get("tuning") else "as the file gives them"
+    table.caption = f"means over a revolution, uniform wind; gains {source}: {gains}"
+    return table
+
+
+def _figure(value: float) -> str:
+    """Four digits, none of a power of ten; what is nothing beside its range is nothing."""
+    if not np.isfinite(value):
+        return "-"
+    return f"{value:,.0f}" if abs(value) >= 1e3 else f"{value:.4g}" if abs(value) >= 1e-3 else "0"
+
+
+_NOT_PRINTED = ("blade1_root_edgewise_moment", "tower_base_side_side_moment", "tower_fore_aft")
+_SHORT = {
+    "generator_power": "power",
+    "generator_torque": "generator torque",
+    "rotor_thrust": "thrust",
+    "blade1_tip_out_of_plane": "tip out of plane",
+    "blade1_root_flapwise_moment": "root flapwise moment",
+    "tower_base_fore_aft_moment": "tower-base fore-aft moment",
+}
+_GAINS = ("proportional_gain", "integral_gain", "gain_schedule_pitch_deg")
 
 
 def _plain_table(title: str, *headings: str) -> Table:
@@ -77,18 +137,10 @@ def _operating_points(turbine: Turbine, winds: Sequence[float], pitch: float) ->
     headings = [f"{BY_NAME[name].label}, {BY_NAME[name].read_unit}" for name in names]
     table = _plain_table("Operating points", "wind, m/s", *headings)
     for wind in winds:
-        values = _means_over_a_revolution(turbine, wind, pitch)
-        table.add_row(f"{wind:g}", *(f"{values[name] * BY_NAME[name].scale:,.4g}" for name in names))
+        values = revolution(turbine, wind, pitch)
+        table.add_row(f"{wind:g}", *(_figure(values[name] * BY_NAME[name].scale) for name in names))
     table.caption = "means over a revolution, without shear"
     return table
-
-
-def _means_over_a_revolution(turbine: Turbine, wind: float, pitch: float) -> dict[str, float]:
-    azimuths = np.arange(24) * 2 * np.pi / 24
-    states = np.array([turbine.operating_point(wind, azimuth=azimuth, pitch=pitch) for azimuth in azimuths])
-    signals = np.tile([wind, 0.0, 0.0], (len(azimuths), 1))
-    series = dict(zip(turbine.layout.names, states.T, strict=True)) | turbine.loads(states, signals, pitch)
-    return {name: float(np.mean(values)) for name, values in series.items()}
 
 
 def _frequencies(turbine: Turbine, winds: Sequence[float], pitch: float) -> Table:

@@ -163,6 +163,13 @@ def operating_point(
     return _states(turbine.layout, unknown, np.array([azimuth]), turbine.parameters["g_ratio"])[:, 0]
 
 
+def revolution(turbine: Equations, wind: float, pitch: float) -> Array:
+    """(AZIMUTHS, size) states of steady rotation in uniform wind."""
+    azimuths = np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
+    unknown = _steady(turbine, wind, 0.0, 0.0, pitch)
+    return _states(turbine.layout, unknown, azimuths, turbine.parameters["g_ratio"]).T
+
+
 def _multiblade(layout: Layout, azimuth: float, speed: float) -> tuple[Array, Array, Array]:
     """T, dT/dt, d2T/dt2 (freedoms, freedoms): blade sets from their mean, cosine and sine parts (Coleman's transformation)."""
     psi = azimuth + np.arange(BLADES) * 2 * np.pi / BLADES

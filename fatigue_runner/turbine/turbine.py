@@ -332,6 +332,12 @@ class Turbine:
             )
         return operating_point(self, wind, vertical_shear, horizontal_shear, azimuth, pitch)
 
+    def revolution(self, wind: float, pitch: float = 0.0) -> Array:
+        """(n, size) states at equal steps of the azimuth, one revolution of steady rotation in uniform wind; else as `operating_point`."""
+        from fatigue_runner.turbine.steady import revolution
+
+        return revolution(self, wind, pitch)
+
     def natural_frequencies(self, wind: float, pitch: float = 0.0) -> list[tuple[str, float, float]]:
         """(name, undamped natural frequency [Hz], damping ratio) of the oscillating modes, by frequency."""
         from fatigue_runner.turbine.steady import natural_frequencies
