@@ -93,4 +93,4 @@ def _panel(axes: Axes, winds: Sequence[float], panel: Sequence[str], curves: Map
     axes.spines[["top", "right"]].set_visible(False)
     axes.tick_params(labelsize=7.5, color=_QUIET)
     axes.grid(axis="y", linewidth=0.4, color="#d5d5d5")
-    axes.margins(y=0.12)
+    axes.margins(y=0.12 if len(channels) == 1 else 0.3)

@@ -103,6 +103,18 @@ def test_the_report_s_gains_are_stable_and_damp_less_near_rated_wind_where_the_w
     assert np.all(np.diff(damping) > 0) and 0.1 < damping[0] < 0.25 and damping[-1] > 0.6
 
 
+# OpenFAST 5.0.0 under the report's DISCON: frequency [rad/s] and damping ratio of the rotor speed's decay after steps of
+# the wind to 18, 19 and 20 m/s, a damped sine fitted from 2 s after the step
+OPENFAST_DECAY = {18.0: (0.468, 0.521), 19.0: (0.522, 0.617), 20.0: (0.540, 0.687)}
+
+
+@pytest.mark.parametrize("wind", OPENFAST_DECAY)
+def test_speed_and_pitch_die_out_as_openfasts(turbine, wind):
+    found = speed_mode(turbine, wind)
+    assert found.frequency == pytest.approx(OPENFAST_DECAY[wind][0], rel=0.07)
+    assert found.damping == pytest.approx(OPENFAST_DECAY[wind][1], abs=0.04)
+
+
 def test_poles_are_those_of_a_run(turbine):
     """A small push dies out with the mode's frequency and damping."""
     mode = speed_mode(turbine, 14.0)

@@ -41,7 +41,7 @@ def motion(rows: int = 400, step: float = 0.05, error: float = 0.0) -> Trajector
     state[:, 7] = 97 * ROTOR_SPEED * time
     state[:, 14], state[:, 15] = ROTOR_SPEED, 97 * ROTOR_SPEED
     tips = shape().tip_channels(state)
-    loads = {name: 1e6 * (8 + np.sin(time)) for name in LOAD_NAMES}
+    loads = {name: 1e6 * (8 + np.sin(time)) for name in LOAD_NAMES} | {"blade_pitch": np.zeros_like(time)}
     for i in (1, 2, 3):
         loads[f"blade{i}_root_flapwise_moment"] = 2e6 * state[:, 1 + i]
         loads[f"blade{i}_tip_out_of_plane"] = tips[:, i - 1, 0]
