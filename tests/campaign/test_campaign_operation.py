@@ -43,6 +43,42 @@ def test_logs_hold_the_controller_s_states(results):
     assert log.state[:, 16] == pytest.approx(122.9, rel=0.1)
 
 
+def test_pitch_power_and_the_controller_s_signals_are_in_logs_and_results(results):
+    row = results.rows[-1]
+    log = read_log(results.out / "logs" / f"{row['case_id']}.mcap")
+    assert {"pitch_rate", "pitch_rate_limited", "torque_region", "filtered_generator_speed"} <= set(
+        log.control
+    )
+    assert np.array_equal(log.pitch, log.loads["blade_pitch"]) and np.degrees(log.pitch).mean() > 10
+    kept = log.time >= 2.0 - 1e-9
+    assert row["mean_generator_power"] == pytest.approx(5.0e6, rel=0.02)
+    assert row["std_blade_pitch"] == pytest.approx(np.std(log.pitch[kept]))
+    assert row["std_rotor_speed"] == pytest.approx(np.std(log.state[kept, 14]))
+    assert row["pitch_rate_max"] == pytest.approx(np.abs(log.control["pitch_rate"][kept]).max())
+    assert row["pitch_rate_limited_time"] == 0.0
+    errors = [r["nrmse_speed_error_integral"] for r in results if not r["is_reference"]]
+    assert len(errors) == 2 and max(errors) < 0.01
+
+
+def test_a_pitch_beyond_its_limit_is_told():
+    from fatigue_runner.results.operation import pitch_rate_sentences
+
+    quiet = {"pitch_rate_limited_time": 0.0, "pitch_rate_max": 0.01, "wind_speed": 12.0}
+    beyond = {"pitch_rate_limited_time": 1.5, "pitch_rate_max": 0.1745329, "wind_speed": 24.0}
+    assert pitch_rate_sentences([quiet]) == []
+    (sentence,) = pitch_rate_sentences([quiet, beyond])
+    assert (
+        "In 1 of 2 cases" in sentence
+        and "up to 10 deg/s, for up to 1.5 s, at mean winds from 24 to 24 m/s" in sentence
+    )
+
+
+def test_winds_outside_of_cut_in_and_cut_out_run_and_are_told():
+    notes = make_plan({**CAMPAIGN, "wind": {"speeds": [10, 26]}}).notes
+    assert [note for note in notes if "26 m/s is above the cut-out wind of nrel5mw (25 m/s)" in note]
+    assert not any("10 m/s is" in note for note in notes)
+
+
 def test_a_second_run_keeps_what_is_finished(results):
     again = run_campaign(CAMPAIGN, results.out)
     load = "del_tower_base_fore_aft_moment_m4"
