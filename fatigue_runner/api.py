@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fatigue_runner.campaign import run_campaign
-from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.errors import FatigueRunnerWarning, InputError, did_you_mean
 from fatigue_runner.fatigue import damage_equivalent_load, rainflow
 from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
 from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
@@ -49,6 +51,9 @@ __all__ = [
 ]
 
 
+MOST_PITCH = math.pi / 2  # feathered
+
+
 def simulate(
     turbine: Any,
     wind: WindSource | float,
@@ -59,7 +64,7 @@ def simulate(
     output_step: float | None = None,
     pitch: float | PitchSeries = 0.0,
     corrector: Any = None,
-    mode: str = "enhanced",
+    mode: str = "hybrid",
     operation: str = "fixed",
 ) -> Trajectory:
     """Simulate one case and return its trajectory.
@@ -67,9 +72,9 @@ def simulate(
     turbine: of `load_turbine`, or a name for it; wind: a wind source, or a constant speed [m/s]; step,
     duration [s]; initial: "operating-point", "paper", "paper-spinning" or a state; output_step [s]:
     None samples every step, else the solution is interpolated; pitch [rad]: a number, or a PitchSeries for a
-    pitch that varies in time. A case that diverges ends early: see `diverged_at`. corrector: a name of
-    `correctors()`, a path or a Corrector; mode: "enhanced", or "hybrid", which guards it. operation: "fixed" holds the pitch, "controlled"
-    has the turbine's controller, "torque-law" its torque at fine pitch. Raises InputError
+    pitch that varies in time (a campaign file has degrees). A case that diverges ends early, with a warning: see `diverged_at`.
+    corrector: a name of `correctors()`, a path or a Corrector; mode: "hybrid", which guards it, or "enhanced".
+    operation: "fixed" holds the pitch, "controlled" has the turbine's controller, "torque-law" its torque at fine pitch. Raises InputError
     for an unknown method or turbine, a step that is not positive, a malformed state, a controller that makes the turbine unstable and
     aerodynamic tables that end below the pitch which the wind needs.
     """
@@ -85,6 +90,10 @@ def simulate(
         raise InputError(
             f"operation {operation!r} makes the pitch itself; give none, or use operation='fixed'"
         )
+    if isinstance(pitch, int | float) and abs(pitch) > MOST_PITCH:
+        raise InputError(
+            f"pitch is in rad: {pitch:g} rad are {math.degrees(pitch):.0f} deg; give math.radians({pitch:g})"
+        )
     if isinstance(wind, int | float):
         wind = ConstantWind(float(wind))
     for name, value in (("step", step), ("duration", duration), ("output_step", output_step)):
@@ -99,7 +108,15 @@ def simulate(
     check_loop(turbine)
     check_wind(turbine, wind.mean_speed)
     start = _state(turbine, initial, wind, first_pitch(pitch))
-    return run(Ensemble(turbine, [wind], start[None, :], duration, output_step, pitch), integrator)[0]
+    trajectory = run(Ensemble(turbine, [wind], start[None, :], duration, output_step, pitch), integrator)[0]
+    if trajectory.diverged_at is not None:
+        warnings.warn(
+            f"{integrator.label} diverged at {trajectory.diverged_at:.4g} s of {duration:g} s: the trajectory ends there, and "
+            "cycles of its loads are no fatigue; take a smaller step",
+            FatigueRunnerWarning,
+            stacklevel=2,
+        )
+    return trajectory
 
 
 def correctors() -> list[Any]:

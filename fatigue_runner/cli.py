@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning
-from fatigue_runner.terminal import console
+from fatigue_runner.terminal import console, write_plainly
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -157,6 +157,8 @@ def _print_outcome(results: Results, console: Console) -> None:
     print_ranking(results.rows, console)
     if results.life is not None:
         print_life(results.life, results.rows, console)
+    for sentence in results.notes:
+        console.print(escape(sentence), style="yellow")
     for row in results.lost[:10]:
         when = (
             f"at {row['diverged_at']:.4g} s" if row["status"] == "diverged" else f": {row['error_message']}"
@@ -194,6 +196,7 @@ def main() -> None:
     arguments = [argument for argument in sys.argv[1:] if argument != "--debug"]
     debug = len(arguments) != len(sys.argv) - 1
     _say_warnings_plainly()
+    write_plainly()
     try:
         app(args=arguments, prog_name="fatigue-runner")
     except BrokenPipeError:  # `| head` closed the pipe

@@ -52,9 +52,8 @@ def value_id(value: float) -> str:
     return f"{value:.2f}" if round(value, 2) == value else f"{value:.6g}"
 
 
-LONGEST = (
-    80  # bytes of a file's name in an id; a file system takes 255, and an integrator and an ending follow
-)
+LONGEST_NAME = 255  # bytes of a file's name that most file systems take
+LONGEST = 80  # bytes of a file's name in an id: an integrator and an ending follow
 
 
 def file_id(stem: str) -> str:

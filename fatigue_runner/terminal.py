@@ -5,6 +5,9 @@ A room's commands stand in its `commands.py` as a Typer app named `app`; cli.py 
 
 from __future__ import annotations
 
+import codecs
+import io
+import sys
 from typing import TYPE_CHECKING
 
 import typer
@@ -22,6 +25,25 @@ def command_group(help: str | None = None) -> typer.Typer:
         add_completion=False,  # the whole program has it
         help=help,
     )
+
+
+# What a terminal or a pipe without these signs gets instead; for the rest a question mark.
+_PLAIN = {"≤": "<=", "≥": ">=", "−": "-", "–": "-", "—": "-", "…": "...", "×": "x", "·": ".", "●": "*", "°": "deg", "µ": "u", "σ": "sigma",
+          "α": "alpha", "κ": "kappa", "²": "2", "³": "3", "ö": "oe", "ü": "ue", "ä": "ae", "\u00a0": " "}  # fmt: skip
+
+
+def _plainly(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(_PLAIN.get(sign, "?") for sign in error.object[error.start : error.end]), error.end
+
+
+def write_plainly() -> None:
+    """Let output and errors of this process be written in whatever encoding their pipe has, so that none ends a finished campaign."""
+    codecs.register_error("plainly", _plainly)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="plainly")
 
 
 def console(least: int = 0) -> Console:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 
 import pytest
@@ -69,6 +70,17 @@ def test_run_into_the_same_folder_says_what_it_kept(world, call, tmp_path):
     assert code == 0
     assert "12 of 12 cases are finished from an earlier run and are kept" in words(out)
     assert "12 cases, 0 of them simulated now" in words(out)
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "latin-1", "ascii"])
+def test_a_pipe_of_any_encoding_gets_the_answer(world, call, tmp_path, monkeypatch, encoding):
+    """A finished campaign once ended with an internal error where the pipe has no `≤`."""
+    pipe = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    monkeypatch.setattr(sys, "stdout", pipe)
+    code, *_ = call("run", write_campaign(tmp_path))
+    pipe.flush()
+    out = pipe.buffer.getvalue().decode(encoding)
+    assert code == 0 and "<= 0.1 %" in out and "report: runs" in out and "?" not in out
 
 
 def test_a_diverged_case_is_listed_with_its_time_and_the_exit_code_is_1(world, call, tmp_path):

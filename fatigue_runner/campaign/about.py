@@ -14,15 +14,18 @@ from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.campaign.spec import IntegratorSection
 from fatigue_runner.inputs.files import to_yaml
 from fatigue_runner.inputs.source import Place
+from fatigue_runner.turbine.rated import rated_rotor_speed
 
 
 def about(resolved: Resolved) -> dict[str, str]:
     """Facts by name, as text: campaign, turbine, turbine_hash, versions, machine."""
     versions = [f"fatigue-runner {__version__}", *(f"{name} {metadata.version(name)}" for name in LIBRARIES)]
+    rated = rated_rotor_speed(resolved.turbine)
     return {
         "campaign": resolved.campaign.name,
         "turbine": resolved.turbine.name,
         "turbine_hash": resolved.turbine.hash,
+        "rated_rotor_speed": "" if rated is None else f"{rated:.9g}",
         "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
         "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.system()}",
     }

@@ -19,6 +19,7 @@ from fatigue_runner.campaign.evaluate import (
     scaled_error,
 )
 from fatigue_runner.campaign.integration import Integration
+from fatigue_runner.campaign.pieces import leave
 from fatigue_runner.campaign.spec import Campaign
 from fatigue_runner.channels import Channel
 from fatigue_runner.errors import FatigueRunnerError
@@ -76,13 +77,16 @@ def run_block(job: Job) -> list[dict[str, Any]]:
                 own = evaluate(outcome, job.setup.campaign, job.setup.walls)
                 if integration.is_reference:
                     references[case.wind] = own if outcome.diverged_at is None else None
-                if case.id in wanted:
-                    records.append(_finish(job, case, wind, outcome, own, reference))
+                record = _finish(job, case, wind, outcome, own, reference) if case.id in wanted else None
             except Exception as error:  # one case's trouble (a full disk, a bad wind) must not end the others
-                if case.id in wanted:
-                    source = None if isinstance(wind, Exception) else wind
-                    row = failed_row(case, source, error, job.setup.campaign, job.setup.states)
-                    records.append(_record(case, row, 0))
+                source = None if isinstance(wind, Exception) else wind
+                failed = _record(
+                    case, failed_row(case, source, error, job.setup.campaign, job.setup.states), 0
+                )
+                record = failed if case.id in wanted else None
+            if record is not None:
+                records.append(record)
+                leave(job.setup.logs.parent, job.cases[0].id, record)
     return records
 
 

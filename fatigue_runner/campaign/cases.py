@@ -14,7 +14,7 @@ from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.provenance import code_hash
 from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.errors import InputError
-from fatigue_runner.naming import joined
+from fatigue_runner.naming import LONGEST_NAME, joined
 from fatigue_runner.wind.section import Realisation
 
 
@@ -60,6 +60,7 @@ def make_cases(resolved: Resolved) -> list[Case]:
             record = [simulation_hash, reference_hash, integration.is_reference, evaluation, case_id]
             cases.append(Case(case_id, wind.named, integration, simulation_hash, _digest(record)))
     _refuse_same_names(cases)
+    _refuse_long_names(cases)
     return cases
 
 
@@ -71,6 +72,15 @@ def _refuse_same_names(cases: Iterable[Case]) -> None:
                 f"two cases would have the same name {case.id!r}; {_way_out(seen[case.id], case)}"
             )
         seen[case.id] = case
+
+
+def _refuse_long_names(cases: Iterable[Case]) -> None:
+    for case in cases:
+        if len(f"{case.id}.mcap.part".encode()) > LONGEST_NAME:
+            raise InputError(
+                f"the log of case {case.id[:60]}... would have a name of more than {LONGEST_NAME} bytes; give the corrector or the file a "
+                "shorter name"
+            )
 
 
 def _way_out(one: Case, other: Case) -> str:

@@ -8,8 +8,11 @@ from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.campaign.spec import Pitch
 from fatigue_runner.errors import InputError
+from fatigue_runner.integrators.pitch import PitchSeries
+from fatigue_runner.results.beyond import no_pitch_control
 from fatigue_runner.results.lifetime_section import check_covered
 from fatigue_runner.turbine.dynamics import signals_of_control
+from fatigue_runner.turbine.rated import rated_rotor_speed, rated_speed_wind
 
 
 def check(resolved: Resolved) -> list[str]:
@@ -27,7 +30,28 @@ def check(resolved: Resolved) -> list[str]:
         except _Refused as refused:
             where = resolved.source.where((*integration.path, *refused.key))
             raise InputError(f"{where}: {refused}") from None
-    return [*wind_words(resolved)["notes"], *_unseen_winds(resolved)]
+    return [*_fixed_pitch(resolved), *wind_words(resolved)["notes"], *_unseen_winds(resolved)]
+
+
+def _fixed_pitch(resolved: Resolved) -> list[str]:
+    """That nobody pitches, where the rotor so reaches its rated speed, and which winds are above."""
+    if resolved.campaign.operation != "fixed":
+        return []
+    rated = rated_rotor_speed(resolved.turbine)
+    at = (
+        None
+        if isinstance(resolved.pitch, PitchSeries)
+        else rated_speed_wind(resolved.turbine, resolved.pitch)
+    )
+    if at is None:
+        return [no_pitch_control(rated)]
+    above = sum(wind.source.mean_speed > at for wind in resolved.winds)
+    beyond = (
+        f", and {above} of {len(resolved.winds)} winds are above: use operation: controlled there"
+        if above
+        else ""
+    )
+    return [f"{no_pitch_control(rated)} It turns so fast in some {at:.2g} m/s{beyond}."]
 
 
 def _check_logged_channels(resolved: Resolved) -> None:

@@ -15,9 +15,12 @@ from fatigue_runner.campaign.provenance import code_hash
 from fatigue_runner.campaign.resolve import Resolved, ResolvedWind, resolve
 from fatigue_runner.campaign.spec import Campaign, read_campaign
 from fatigue_runner.campaign.store import Store
+from fatigue_runner.channels import LOADS
 
 # Winds per block: the width of the lane kernel. A block is what progress counts in and what Ctrl-C can lose.
 BLOCK_SIZE = 16
+# of a log: fields of a status message, head and index of a message [bytes], what compression leaves (measured)
+STATUS_FIELDS, MESSAGE_BYTES, COMPRESSED = 7, 56.0, 0.75
 
 
 @dataclass
@@ -48,6 +51,25 @@ class Plan:
     def logs_are_whole(self) -> bool:
         """Whether a log holds all that a trajectory needs to be evaluated again."""
         return self.campaign.log.topics is None and self.campaign.log.channels is None
+
+    @property
+    def log_bytes(self) -> float:
+        """About what the log of one case takes [bytes]: nine for a number and a tenth for the rest, less what compression takes off."""
+        campaign = self.campaign
+        if not campaign.log.enabled:
+            return 0.0
+        layout = self.resolved.turbine.layout
+        signals = max(len(wind.source.channels) for wind in self.resolved.winds)
+        topics = {"state": layout.size, "loads": len(LOADS), "status": STATUS_FIELDS, "wind": signals}
+        fields = [count for name, count in topics.items() if name in (campaign.log.topics or topics)]
+        chosen = len(campaign.log.channels or ()) or sum(fields)
+        row = 9.0 * min(chosen, sum(fields)) + MESSAGE_BYTES * len(fields)
+        return (
+            campaign.duration
+            * campaign.output_rate
+            * row
+            * (1.0 if campaign.log.compression == "none" else COMPRESSED)
+        )
 
     def jobs(self, store: Store, setup: Setup, workers: int) -> list[Job]:
         """The blocks of all cases that are not finished in the store, with the references that they need."""

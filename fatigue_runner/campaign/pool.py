@@ -6,13 +6,18 @@ import multiprocessing
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
 from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
-from fatigue_runner.errors import InputError
+from fatigue_runner.errors import FatigueRunnerError, InputError
 
 T = TypeVar("T")
 J = TypeVar("J")
+
+
+class WorkerEndedError(FatigueRunnerError):
+    """A worker is gone; what it was doing must be done again."""
 
 
 def connect(dask: str) -> None:
@@ -46,6 +51,10 @@ def run_jobs(
         results = parallel(joblib.delayed(_guarded)(function, job) for job in jobs)
         try:
             yield from results
+        except BrokenExecutor as error:  # of loky: TerminatedWorkerError
+            raise WorkerEndedError(
+                "a worker process was ended from outside, most likely by the system for want of memory"
+            ) from error
         finally:
             results.close()
 

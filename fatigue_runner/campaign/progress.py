@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -52,10 +51,10 @@ class Progress:
                     f"{kept} of {total} cases are finished from an earlier run and are kept"
                 )
 
-    def advance(self, records: Sequence[dict[str, Any]]) -> None:
-        """A block of cases came in."""
-        if self._bar is not None:
-            self._bar.advance(self._task, len(records))
+    def advance(self, cases: int) -> None:
+        """So many cases came in."""
+        if self._bar is not None and cases:
+            self._bar.advance(self._task, cases)
 
 
 def _bar(console: Console) -> Any:
@@ -65,15 +64,29 @@ def _bar(console: Console) -> Any:
         def render(self, task: progress.Task) -> str:
             return f"{task.speed:.3g} cases/s" if task.speed else ""
 
+    class Times(progress.ProgressColumn):
+        def render(self, task: progress.Task) -> str:
+            left = task.time_remaining
+            gone = f"{_minutes(task.elapsed or 0.0)} so far"
+            return gone if left is None or task.finished else f"{gone}, about {_minutes(left)} left"
+
     return progress.Progress(
         progress.SpinnerColumn(),
         progress.TextColumn("{task.description}"),
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
         Rate(),
-        progress.TimeElapsedColumn(),
-        progress.TextColumn("left"),
-        progress.TimeRemainingColumn(),
+        Times(),
         console=console,
         transient=True,
+    )
+
+
+def _minutes(seconds: float) -> str:
+    """`22 s`, `3:05 min`, `1:02 h`: as short as it can be read."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    return (
+        f"{whole // 60}:{whole % 60:02} min" if whole < 3600 else f"{whole // 3600}:{whole % 3600 // 60:02} h"
     )

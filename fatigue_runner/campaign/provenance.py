@@ -9,10 +9,12 @@ from __future__ import annotations
 import ast
 import functools
 import hashlib
+import re
 from importlib import metadata
 from pathlib import Path
 
 PACKAGE = "fatigue_runner"
+_MADE_NAME = re.compile(rb"import_module\(f\"\{__package__\}\.(\w+)\.")
 START = f"{PACKAGE}.campaign.block"
 # llvmlite makes the machine code, scipy the splines, matrix exponentials and integrals
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
@@ -51,6 +53,7 @@ def deciding_files(root: Path) -> list[Path]:
         found.add(module)
         for name, inner in _imports(modules[module].read_bytes()):
             left += [inner if inner in modules else name]
+        left += _by_name(module, modules)
         left += [*_registered(module, modules), *_registered(module.rpartition(".")[0], modules)]
         left = [name for name in left if name in modules]
     return sorted(modules[module] for module in found)
@@ -82,6 +85,13 @@ def _imports(source: bytes) -> list[tuple[str, str]]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             found += [(node.module, f"{node.module}.{alias.name}") for alias in node.names]
     return [names for names in found if names[0].split(".")[0] == PACKAGE]
+
+
+def _by_name(module: str, modules: dict[str, Path]) -> list[str]:
+    """The modules of a folder beside `module` that it imports by a name which it makes: `import_module(f"{__package__}.folder.{name}")`."""
+    folders = _MADE_NAME.findall(modules[module].read_bytes())
+    above = [f"{module.rpartition('.')[0]}.{folder.decode()}." for folder in folders]
+    return [name for name in modules if name.startswith(tuple(above))] if above else []
 
 
 def _registered(folder: str, modules: dict[str, Path]) -> list[str]:

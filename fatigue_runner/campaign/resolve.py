@@ -165,7 +165,9 @@ def _corrector(section: IntegratorSection, source: Source, path: tuple[str | int
     from fatigue_runner.corrector import library
 
     try:
-        file = library.locate(section.corrector, [source.folder]).resolve()
+        file = library.locate(
+            section.corrector, [source.folder, source.file(section.corrector).parent]
+        ).resolve()
         digest = file_hash(file)
         name = load_corrector(str(file), digest).name
     except InputError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -11,13 +12,16 @@ from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.campaign.about import about, resolved_yaml, turbine_yaml, wind_words
 from fatigue_runner.campaign.block import Job, Setup, run_block
+from fatigue_runner.campaign.pieces import followed
 from fatigue_runner.campaign.plan import Plan, make_plan
-from fatigue_runner.campaign.pool import connect, run_jobs
+from fatigue_runner.campaign.pool import WorkerEndedError, connect, run_jobs
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.campaign.trust import reference_facts
 from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.results.beyond import beyond
 from fatigue_runner.results.columns import columns
 from fatigue_runner.results.table import Results
+from fatigue_runner.turbine.rated import rated_rotor_speed
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -25,6 +29,9 @@ if TYPE_CHECKING:
 
 # (run folder, cases in all, ids of the cases of each job, workers) -> the context in which the cases run
 Watch = Callable[[Path, int, list[list[str]], int], AbstractContextManager[Any]]
+
+
+LARGE = 1e9  # bytes of logs that are told before a run
 
 
 class CampaignInterrupted(FatigueRunnerError):
@@ -113,15 +120,22 @@ def _simulate(
             _warm_up(plan, jobs)
         progress.say("running")
         ids = [[case.id for case in job.cases] for job in jobs]
-        with watch(store.out, len(plan.cases), ids, workers) if watch else nullcontext():
+        for sentence in _before(plan, store, pending):
+            progress.note(sentence)
+        watched = watch(store.out, len(plan.cases), ids, workers) if watch else nullcontext()
+        with watched, followed(lambda: progress.advance(store.take_in())):
             for records in run_jobs(run_block, jobs, workers, dask):
-                store.add(records)
-                progress.advance(records)
+                progress.advance(store.add(records))
         return pending
     except KeyboardInterrupt:
-        done = sum(store.finished(case, plan.campaign.log.enabled) is not None for case in plan.cases)
+        store.take_in()
         raise CampaignInterrupted(
-            f"interrupted: {done} of {len(plan.cases)} cases are finished; the same command runs the rest"
+            f"interrupted: {_finished(plan, store)} are finished; the same command runs the rest"
+        ) from None
+    except WorkerEndedError as error:
+        raise FatigueRunnerError(
+            f"{error}; {_finished(plan, store)} are finished and kept, the same command runs the rest (with fewer --workers, which "
+            "takes less memory)"
         ) from None
     finally:
         store.close()
@@ -149,14 +163,42 @@ def _warm_up(plan: Plan, jobs: Sequence[Job]) -> None:
                 continue  # what is wrong shows when the cases run
 
 
+def _before(plan: Plan, store: Store, pending: int) -> list[str]:
+    """What a person should know of the disk before the cases run: how much the logs will take, and logs that nobody wants any more."""
+    said = []
+    free = shutil.disk_usage(store.out).free
+    size = pending * plan.log_bytes
+    if size > LARGE or size > 0.5 * free:
+        little = ", too little" if size > free else ""
+        said.append(
+            f"the logs of {pending} cases will take about {size / 1e9:.2g} GB; {free / 1e9:.3g} GB are free{little} (`log:` in the "
+            "campaign can leave out topics and channels)"
+        )
+    strangers = store.strangers(plan.cases)
+    if strangers:
+        freed = sum(path.stat().st_size for path in strangers)
+        said.append(
+            f"{len(strangers)} logs ({freed / 1e6:.3g} MB) in {store.out / 'logs'} are of cases that are no longer in the campaign, "
+            f"{strangers[0].name} for instance; delete them if nobody needs them"
+        )
+    return said
+
+
+def _finished(plan: Plan, store: Store) -> str:
+    done = sum(store.finished(case, plan.campaign.log.enabled) is not None for case in plan.cases)
+    return f"{done} of {len(plan.cases)} cases"
+
+
 def _collect(plan: Plan, store: Store, simulated: int) -> Results:
     fatigue = plan.campaign.fatigue
+    rows = [store.records[case.id]["row"] for case in plan.cases]
     return Results(
         out=store.out,
         columns=columns(
             fatigue.channels, fatigue.wohler_exponents, plan.resolved.turbine.layout.states, fatigue.angles
         ),
-        rows=[store.records[case.id]["row"] for case in plan.cases],
+        rows=rows,
+        notes=beyond(rows, rated_rotor_speed(plan.resolved.turbine)),
         simulated=simulated,
         kept=len(plan.cases) - simulated,
     )

@@ -2,7 +2,8 @@
 
     campaign.yaml   the campaign as it was given
     run.json        the resolved campaign, versions and the turbine's hash: whose folder this is
-    cases.jsonl     one line per finished case, appended as blocks of cases come in
+    cases.jsonl     one line per finished case, appended as they come in
+    finished/       while cases run: what workers have finished of their blocks, see `pieces`
     logs/           <case id>.mcap
     results.csv, results.parquet, lifetime.csv, damage.csv, report.html
 
@@ -11,15 +12,19 @@ A finished case is kept when its hash is unchanged and its log is complete.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
-from collections.abc import Iterable
+import threading
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO, Any
 
 from fatigue_runner.campaign.cases import Case
+from fatigue_runner.campaign.pieces import Pieces
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import write_atomically
+from fatigue_runner.naming import LONGEST_NAME
 
 # What all cases of a folder have in common. Where it differs, no finished case could be kept.
 _IDENTITY = ("name", "code", "turbine_hash", "duration", "output_rate", "initial", "pitch")
@@ -39,6 +44,7 @@ class Store:
         self._journal: IO[bytes] | None = None
         self.earlier: dict[str, Any] = {}  # run.json of the run that goes on
         self._check_folder()
+        self._pieces, self._adding = Pieces(out), threading.Lock()
         self.records = {} if fresh else self._read_records()
 
     def log_path(self, case_id: str) -> Path:
@@ -71,27 +77,51 @@ class Store:
         _lock(self._journal, self.out)
         if self._fresh:
             self._clear()
+            self._pieces.clear()
         elif not self._ends_with_a_line():
             self._journal.write(b"\n")  # what a crash cut off must not spoil the next record
+        self.take_in()  # what a run that was killed had finished of its blocks
+        self._pieces.clear()
         write_atomically(self.out / "campaign.yaml", campaign_text.encode())
         write_atomically(self.out / "run.json", json.dumps(self.identity | run, indent=1).encode())
 
-    def add(self, records: Iterable[dict[str, Any]]) -> None:
-        """Append the records of finished cases; they survive whatever happens next."""
-        assert self._journal is not None, "the store is not open"
-        for record in records:
-            self.records[record["row"]["case_id"]] = record
-            self._journal.write(json.dumps(record, allow_nan=False).encode() + b"\n")
-        self._journal.flush()
-        os.fsync(self._journal.fileno())
+    def add(self, records: Iterable[dict[str, Any]]) -> int:
+        """Append the records of finished cases; they survive whatever happens next. Returns how many were not there yet."""
+        # as they are when they are read again, so that the same record is the same whichever way it came
+        return self._add_new(lambda: [json.loads(json.dumps(record, allow_nan=False)) for record in records])
+
+    def take_in(self) -> int:
+        """Take in what workers have left of blocks that still run; returns how many cases were not there yet."""
+        return self._add_new(self._pieces.new)
+
+    def _add_new(self, come: Callable[[], list[dict[str, Any]]]) -> int:
+        journal = self._journal
+        assert journal is not None, "the store is not open"
+        with self._adding:
+            new = [r for r in come() if self.records.get(r["row"]["case_id"]) != r]
+            for record in new:
+                self.records[record["row"]["case_id"]] = record
+                journal.write(json.dumps(record, allow_nan=False).encode() + b"\n")
+            if new:
+                journal.flush()
+                os.fsync(journal.fileno())
+            return len(new)
+
+    def strangers(self, cases: Iterable[Case]) -> list[Path]:
+        """Logs in the folder that are of none of the cases: of winds and integrators that have left the campaign."""
+        known = {self.log_path(case.id).name for case in cases}
+        return [path for path in sorted((self.out / "logs").glob("*.mcap")) if path.name not in known]
 
     def close(self) -> None:
         """Release the folder."""
         if self._journal is not None:
+            self.take_in()
+            self._pieces.clear()
             self._journal.close()
             self._journal = None
 
     def _check_folder(self) -> None:
+        _refuse_place(self.out)
         if not self.out.exists():
             return
         if not self.out.is_dir():
@@ -145,6 +175,31 @@ class Store:
         self._journal.truncate(0)
         for name in ("results.csv", "results.parquet", "lifetime.csv", "damage.csv", "report.html"):
             (self.out / name).unlink(missing_ok=True)
+
+
+def _refuse_place(out: Path) -> None:
+    """Raises InputError, before anything runs, where the folder cannot be made or written: below a file, a name that is too long, a
+    circle of links, no permission."""
+    above = out.absolute()
+    try:
+        while not above.exists():
+            if above.is_symlink():
+                raise InputError(
+                    f"{out}: {above} is a link that leads nowhere, or in a circle; choose another --out"
+                )
+            above = above.parent
+        if not os.access(above, os.W_OK):
+            raise PermissionError(errno.EACCES, "no permission to write there")
+        if out.absolute() != above and not above.is_dir():
+            raise InputError(f"{out}: {above} is a file, not a folder; choose another --out")
+        longest = os.pathconf(above, "PC_NAME_MAX") if hasattr(os, "pathconf") else LONGEST_NAME
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); choose another --out") from None
+    long = [part for part in out.parts if len(os.fsencode(part)) > longest]
+    if long:
+        raise InputError(
+            f"{str(out)[:60]}...: cannot be written, a name of it is too long; choose a shorter --out"
+        )
 
 
 def _difference(key: str, theirs: Any, mine: Any) -> str:

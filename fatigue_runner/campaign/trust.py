@@ -90,7 +90,14 @@ def _distance(test: Evaluated, reference: Evaluated) -> tuple[float, float]:
     """NRMSE of the worst state, largest DEL error."""
     from fatigue_runner.fatigue import load_error
     from fatigue_runner.results.accuracy import compare
+    from fatigue_runner.results.relevance import governing, relevant
 
-    errors = [load_error(load, reference.loads[key]) for key, load in test.loads.items()]
-    worst = max((abs(e) for e in errors if e is not None), default=0.0)
+    means = {name: float(series.mean()) for name, series in reference.trajectory.loads.items()}
+    worst = 0.0
+    for (channel, m), load in test.loads.items():
+        exact = reference.loads[channel, m]
+        error = load_error(load, exact)
+        if error is not None:
+            same = {name: [mean, reference.loads.get((name, m))] for name, mean in means.items()}
+            worst = max(worst, abs(relevant(error, exact, governing(channel, same))))
     return compare(test.trajectory, reference.trajectory).nrmse_max, worst

@@ -18,6 +18,7 @@ from fatigue_runner.corrector.corrector import Corrector
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.maps import MAPS, map_class
+from fatigue_runner.encoded import refuse_pointer
 from fatigue_runner.layout import FAMILIES, T2B1I1CG, Channel, FirstOrder, Layout, family_of
 
 FORMAT = "fatigue-runner corrector 1"
@@ -87,6 +88,8 @@ def load(path: Path | str) -> Corrector:
     path = Path(path)
     if not path.is_file():
         raise CorrectorError(f"there is no corrector file {path}")
+    with path.open("rb") as file:
+        refuse_pointer(file.read(64), path, "the corrector", CorrectorError)
     try:
         with safe_open(path, framework="numpy") as f:
             metadata = f.metadata() or {}

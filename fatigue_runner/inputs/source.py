@@ -74,9 +74,12 @@ class Source:
         return known
 
     def file(self, name: str) -> Path:
-        """The file that a value names; relative paths start at the source's folder."""
+        """The file that a value names; relative paths start at the source's folder, or where it is a link at that of the file it leads
+        to, if the file is there only."""
         path = Path(name).expanduser()
-        return path if path.is_absolute() else self.folder / path
+        beside = self.folder / path  # the path itself where that is absolute
+        behind = (self.folder / Path(self.name).name).resolve().parent / path
+        return behind if os.path.exists(behind) and not os.path.exists(beside) else beside
 
     def section(self, path: tuple[str | int, ...], without: Sequence[str] = ()) -> Source:
         """The mapping at `path` laid over the top level, less the top level's keys `without`: one campaign of a file that
@@ -193,7 +196,7 @@ def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
         raise InputError(f"{path}: not a {what}: its brackets nest too deeply") from None
     if not isinstance(data, Mapping):
         raise InputError(f"{path}:1: a {what} is a mapping of keys ({keys})")
-    return Source(str(path), data, text, path.resolve().parent, what)
+    return Source(str(path), data, text, path.absolute().parent, what)
 
 
 def _with_spaces(text: str, path: Path) -> str:

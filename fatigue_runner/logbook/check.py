@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from fatigue_runner.logbook.records import (
     open_chunk,
     parse,
     parse_message_index,
+    split_message,
 )
 
 
@@ -53,7 +54,7 @@ class MessageOrder:
     """Whether each channel goes on where it stopped: times never back, and in our logs no row missing."""
 
     def __init__(self, contents: Contents) -> None:
-        self.ours = contents.ours
+        self.in_order = contents.written_here  # other writers may put messages in any order
         # Only a window that was cut out by a tool begins later, and the checksum of such a file is right.
         self._from_row_0 = contents.ours and not contents.verified
         self._last: dict[int, tuple[int, int]] = {}
@@ -68,12 +69,13 @@ class MessageOrder:
                 last_time, last_sequence = self._last[channel_id]
                 log_time = np.concatenate([[np.uint64(last_time)], log_time])
                 sequence = np.concatenate([[last_sequence], sequence])
-            if (log_time[1:] < log_time[:-1]).any():
+            if self.in_order and (log_time[1:] < log_time[:-1]).any():
                 return "times go backwards"
-            if self.ours and (np.diff(sequence) != 1).any():
+            if self.in_order and (np.diff(sequence) != 1).any():
                 return "rows are missing"
         for channel_id, found in entries.items():
-            self._last[channel_id] = int(found[-1, 0]), int(found[-1, 2])
+            before = self._last.get(channel_id, (0, 0))
+            self._last[channel_id] = max(int(found[-1, 0]), before[0]), max(int(found[:, 2].max()), before[1])
         return None
 
     @property
@@ -94,9 +96,9 @@ def _blocks(records: Sequence[Record]) -> Iterator[tuple[Record, list[Record]]]:
 
 
 def _chunk_index(
-    record: Record, indexes: list[Record], entries: dict[int, np.ndarray], problems: list[str]
+    record: Record, indexes: list[Record], entries: dict[int, np.ndarray], problems: list[str], due: bool
 ) -> ChunkIndex:
-    """What the summary must say about a chunk; compares its header and indexes with its messages."""
+    """What the summary must say about a chunk; compares its header and indexes with its messages. due: every topic has an index."""
     chunk = parse(record)
     times = np.concatenate([e[:, 0] for e in entries.values()]) if entries else np.zeros(1, np.uint64)
     if entries and (chunk.message_start_time, chunk.message_end_time) != (times.min(), times.max()):
@@ -108,7 +110,7 @@ def _chunk_index(
         expected = entries.get(channel_id, np.empty((0, 3)))[:, :2]
         if not np.array_equal(found[found[:, 1].argsort()], expected):
             problems.append(f"a message index is wrong (at byte {index_record.start})")
-    if set(entries) - set(places):
+    if due and set(entries) - set(places):
         problems.append(f"a chunk lacks message indexes (at byte {record.start})")
     return ChunkIndex(
         chunk_length=record.end - record.start,
@@ -136,28 +138,39 @@ def _survey(contents: Contents, order: MessageOrder, problems: list[str]) -> Ind
                 entry = (a.log_time, a.create_time, len(a.data), a.name, a.media_type)
                 index.attachments.append(AttachmentIndex(record.start, size, *entry))
             elif record.opcode == Opcode.CHUNK:
-                plain = open_chunk(record, contents.ours)[1]
+                plain = open_chunk(record, contents.written_here)[1]
                 entries = message_entries(plain, record.start)
                 wrong = order.problem(entries)
-                if contents.channels and not set(entries) <= set(contents.channels):
+                declared = set(contents.channels)
+                if contents.written_here and declared and not set(entries) <= declared:
                     wrong = "messages of a topic that is not declared"
                 if wrong:
                     problems.append(f"{wrong} (at byte {record.start})")
-                found = _chunk_index(record, indexes, entries, problems)
+                found = _chunk_index(record, indexes, entries, problems, contents.written_here)
                 index.chunks.append(found)
                 counts = {c: len(e) for c, e in entries.items()}
                 index.count_messages(counts, found.message_start_time, found.message_end_time)
+                index.statistics.chunk_count += 1
+            elif record.opcode == Opcode.MESSAGE:
+                channel_id, _, log_time, _ = split_message(record.body)
+                index.count_messages({channel_id: 1}, log_time, log_time)
         except Damage as damage:
             problems.append(str(damage))
     index.schemas, index.channels = list(contents.schemas.values()), list(contents.channels.values())
     return index
 
 
-def _compare(expected: Index, found: Index, inner: bool) -> Iterator[str]:
-    """Where the summary disagrees with the file; inner: schemas and channels may be inside the chunks."""
-    for name in ("chunks", "metadata", "attachments") + (() if inner else ("schemas", "channels")):
-        if sorted(getattr(expected, name), key=repr) != sorted(getattr(found, name), key=repr):
+def _compare(expected: Index, found: Index, written_here: bool) -> Iterator[str]:
+    """Where the summary disagrees with the file. Of another writer's every part is optional, and schemas and channels may stand in the
+    chunks only."""
+    for name in ("chunks", "metadata", "attachments") + (("schemas", "channels") if written_here else ()):
+        said, held = getattr(found, name), getattr(expected, name)
+        if not written_here and name == "chunks":
+            held = [_as_said(index, said) for index in held]
+        if (written_here or said) and sorted(held, key=repr) != sorted(said, key=repr):
             yield f"the summary's list of {name} is not what the file holds"
+    if not (written_here or found.counted):
+        return
     a, b = expected.statistics, found.statistics
     counted = {k: n for k, n in b.channel_message_counts.items() if n}
     if (a.message_count, a.channel_message_counts, a.chunk_count) != (
@@ -168,6 +181,14 @@ def _compare(expected: Index, found: Index, inner: bool) -> Iterator[str]:
         yield "the summary's message counts are not what the file holds"
     if (a.message_start_time, a.message_end_time) != (b.message_start_time, b.message_end_time):
         yield "the summary's times are not those of the messages"
+
+
+def _as_said(held: ChunkIndex, said: Sequence[ChunkIndex]) -> ChunkIndex:
+    """A chunk's index without the places of its message indexes where the summary does not give them."""
+    same = next((index for index in said if index.chunk_start_offset == held.chunk_start_offset), None)
+    if same is None or same.message_index_offsets:
+        return held
+    return replace(held, message_index_offsets={}, message_index_length=same.message_index_length)
 
 
 def check(path: str | os.PathLike[str]) -> Check:
@@ -188,7 +209,8 @@ def check(path: str | os.PathLike[str]) -> Check:
     rows = {"": 0, **contents.metadata.get("result", {})}.get("rows")
     try:
         summary, _ = read_summary(path)
-        found.problems += _compare(expected, summary, not contents.channels)
+        if contents.written_here or not summary.absent:
+            found.problems += _compare(expected, summary, contents.written_here)
     except (Damage, LogError) as damage:
         found.problems.append(str(damage))
     found.chunks = expected.statistics.chunk_count

@@ -89,16 +89,19 @@ class Index:
     chunks: list[ChunkIndex] = field(default_factory=list)
     attachments: list[AttachmentIndex] = field(default_factory=list)
     metadata: list[MetadataIndex] = field(default_factory=list)
+    counted: bool = False  # whether the summary has statistics
+    absent: bool = False  # whether the file has no summary
 
     def count_messages(self, counts: Mapping[int, int], start_time: int, end_time: int) -> None:
-        """Add a chunk's messages, by channel id, and its span [ns] to the statistics."""
+        """Add messages, by channel id, and their span [ns] to the statistics."""
         s = self.statistics
+        if not counts:
+            return
         s.message_start_time = min(s.message_start_time, start_time) if s.message_count else start_time
         s.message_end_time = max(s.message_end_time, end_time)
         for channel_id, count in counts.items():
             s.channel_message_counts[channel_id] = s.channel_message_counts.get(channel_id, 0) + count
             s.message_count += count
-        s.chunk_count += 1
 
     def encode(self, start: int) -> tuple[bytes, int]:
         """The summary section for a file where it begins at byte `start`, and where its offsets begin."""
@@ -211,6 +214,7 @@ class Container:
             )
         )
         self.index.count_messages({c: len(e) for c, e in entries.items()}, start_time, end_time)
+        self.index.statistics.chunk_count += 1
 
     def finish(self) -> None:
         """Write DataEnd, summary, footer and closing magic; the stream stays open."""

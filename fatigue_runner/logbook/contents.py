@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Schema
 
+from fatigue_runner.encoded import refuse_pointer
 from fatigue_runner.logbook.container import LIBRARY, MAGIC
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.records import Damage, Record, parse, parse_attachment, parse_metadata, walk
@@ -32,8 +33,8 @@ _DATA_OPCODES = frozenset(
 class Contents:
     """The data section of an MCAP file.
 
-    ours: written by this program (or rewritten by an MCAP tool from such a file), so that all of its
-    checksums are due. damages: what was found wrong, in the order of the file; ended: the data section is
+    ours: a log of this program, written by it or rewritten by an MCAP tool; written_here: by it, so that all of its checksums and
+    indexes are due, which MCAP leaves to the writer. damages: what was found wrong, in the order of the file; ended: the data section is
     whole.
     """
 
@@ -49,6 +50,11 @@ class Contents:
     damages: list[Damage] = field(default_factory=list)
     ended: bool = False
     verified: bool = False
+
+    @property
+    def written_here(self) -> bool:
+        """Whether the header names this program."""
+        return self.header is not None and str(self.header.library).startswith(LIBRARY)
 
     @property
     def signed(self) -> frozenset[str]:
@@ -86,6 +92,7 @@ def require_magic(data: bytes, path: object) -> None:
     """Raises LogError where the data do not begin as an MCAP file does."""
     if not data:
         raise LogError(f"{path} is empty, not an MCAP log")
+    refuse_pointer(data, path, "the log", LogError)
     if not data.startswith(MAGIC):
         raise LogError(f"{path} is not an MCAP log: it begins with {bytes(data[:8])!r}, not with {MAGIC!r}")
 
@@ -131,9 +138,9 @@ def read_contents(data: bytes, path: object) -> Contents:
 
 def _verify(contents: Contents, end: Record, data: bytes) -> None:
     crc = parse(end).data_section_crc
-    if (crc or contents.ours) and crc != zlib.crc32(memoryview(data)[: end.start]):
+    if (crc or contents.written_here) and crc != zlib.crc32(memoryview(data)[: end.start]):
         raise Damage("the file does not match its checksum", end.start)
-    contents.verified = bool(crc) or contents.ours
+    contents.verified = True
 
 
 def take(contents: Contents, record: Record) -> None:
@@ -159,5 +166,5 @@ def take(contents: Contents, record: Record) -> None:
         contents.channels[channel.id] = channel
     elif opcode == Opcode.DATA_END:
         contents.ended = True
-    elif contents.ours and opcode not in _DATA_OPCODES:
+    elif contents.written_here and opcode not in _DATA_OPCODES:
         raise Damage(f"a record of unknown kind {opcode}", record.start)

@@ -111,7 +111,7 @@ def _records(contents: Contents, damages: list[Damage]) -> Iterator[tuple[Record
             yield outer, outer.start
         elif outer.opcode == Opcode.CHUNK:
             try:
-                plain = open_chunk(outer, contents.ours)[1]
+                plain = open_chunk(outer, contents.written_here)[1]
                 for inner in walk(plain, 0):
                     yield inner, outer.start
             except Damage as damage:

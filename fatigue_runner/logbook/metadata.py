@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import zlib
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -27,6 +28,8 @@ def _summary_bytes(stream: IO[bytes], size: int) -> tuple[bytes, int]:
         raise Damage("the file does not end as an MCAP file does", size)
     footer = parse(next(walk(tail, 0)))
     start = footer.summary_start
+    if start == 0:
+        return b"", 0
     if not len(MAGIC) <= start <= size - _TAIL_SIZE:
         raise Damage("the footer points outside the file, or there is no summary", size - _TAIL_SIZE)
     stream.seek(start)
@@ -38,7 +41,7 @@ def _summary_bytes(stream: IO[bytes], size: int) -> tuple[bytes, int]:
 
 def parse_summary(data: bytes, start: int) -> Index:
     """The index that a summary section declares; start: where it begins in the file."""
-    index = Index()
+    index = Index(absent=not data)
     groups: dict[int, list[Any]] = {
         Opcode.SCHEMA: index.schemas,
         Opcode.CHANNEL: index.channels,
@@ -48,7 +51,7 @@ def parse_summary(data: bytes, start: int) -> Index:
     }
     for record in walk(data, 0):
         if record.opcode == Opcode.STATISTICS:
-            index.statistics = parse(record)
+            index.statistics, index.counted = parse(record), True
         elif record.opcode in groups:
             groups[record.opcode].append(parse(record))
     return index
@@ -62,7 +65,7 @@ def read_summary(path: str | os.PathLike[str]) -> tuple[Index, dict[str, dict[st
     """
     try:
         with open(path, "rb") as stream:
-            require_magic(stream.read(len(MAGIC)), path)
+            require_magic(stream.read(64), path)
             size = os.fstat(stream.fileno()).st_size
             index = parse_summary(*_summary_bytes(stream, size))
             metadata = {}
@@ -90,10 +93,11 @@ def read_metadata(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     A file without a summary, such as the `.part` file of a run that has not ended, is walked through instead.
     Raises LogError for a file that is missing, no MCAP, or whose metadata are damaged.
     """
-    try:
-        return read_summary(path)[1]
-    except Damage:
-        contents = read_contents(read_bytes(path), path)
+    with suppress(Damage):
+        index, found = read_summary(path)
+        if index.metadata or (index.counted and not index.statistics.metadata_count):
+            return found
+    contents = read_contents(read_bytes(path), path)
     try:
         for record in contents.records:
             if record.opcode == Opcode.METADATA:

@@ -95,12 +95,12 @@ def _decode_fixed(contents: Contents, layout: RowLayout) -> tuple[Tables, list[D
     count = 0
     for record in contents.chunks:
         try:
-            plain = open_chunk(record, must_be_signed=True)[1]
+            plain = open_chunk(record, contents.written_here)[1]
         except Damage as damage:
             damages.append(damage)
             break
         rows = layout.rows_in(plain, count)
-        if rows is None and contents.verified:
+        if rows is None and (contents.verified or not contents.written_here):
             return None
         if rows is None:
             damages.append(Damage("rows are missing, or their topics are", record.start))
@@ -261,7 +261,8 @@ def read_log(path: str | os.PathLike[str], *, partial: bool = False) -> Log:
     contents = read_contents(read_bytes(path), path)
     try:
         layout = row_layout(contents)
-        decoded = _decode_fixed(contents, layout) if layout and layout.topics else None
+        fixed = layout and layout.topics and not contents.messages
+        decoded = _decode_fixed(contents, layout) if layout and fixed else None
         tables, found = decoded or generic.decode(contents)
     except LogError as error:
         raise LogError(f"{path} cannot be read: {error}") from None

@@ -118,8 +118,10 @@ def parse_metadata(record: Record, signed: Collection[str]) -> Metadata:
 def parse_attachment(record: Record) -> Attachment:
     """An Attachment record. Raises Damage where its checksum (0: none) or its length is wrong."""
     found: Attachment = parse(record)
-    checksum = int.from_bytes(record.body[-4:], "little")
-    if checksum and checksum != zlib.crc32(record.body[:-4]):
+    # its fields' length; later versions of the format may have more behind them
+    size = 16 + 4 + len(found.name.encode()) + 4 + len(found.media_type.encode()) + 8 + len(found.data)
+    checksum = int.from_bytes(record.body[size : size + 4], "little")
+    if checksum and checksum != zlib.crc32(record.body[:size]):
         raise Damage(f"attachment {found.name!r} is damaged", record.start)
     return found
 

@@ -94,7 +94,7 @@ class _Rebuild:
         self.container.raw_metadata(parse(record))
 
     def _chunk(self, record: Record) -> None:
-        chunk, plain = open_chunk(record, self.contents.ours)
+        chunk, plain = open_chunk(record, self.contents.written_here)
         entries = message_entries(plain, record.start)
         wrong = self.order.problem(entries)
         if wrong:
@@ -201,11 +201,11 @@ def recover(path: str | os.PathLike[str], to: str | os.PathLike[str] | None = No
     data = read_bytes(source)
     contents = read_contents(data, source)
     refuse_if_being_written(source)
-    _refuse(source, contents)
     target = _target(source, to)
     found = check(source)
     if found.ok:
         return _keep(source, target, data, found)
+    _refuse(source, contents)
     with replacing(target, ".recovering") as stream:
         rebuild = _Rebuild(contents, stream)
         for record in contents.records:

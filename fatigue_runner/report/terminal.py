@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.channels import BY_NAME
-from fatigue_runner.results.cells import Row, format_percent, numbers
+from fatigue_runner.results.cells import Row, format_percent
 from fatigue_runner.results.operation import pitch_rate_sentences
 from fatigue_runner.results.ranking import (
     LEVELS,
@@ -17,6 +17,7 @@ from fatigue_runner.results.ranking import (
     rank,
     unseen_winds,
 )
+from fatigue_runner.results.relevance import relevant_errors
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -94,8 +95,13 @@ def _table(rows: Sequence[Row], summaries: Sequence[MethodSummary], console: Con
 
 def _worst_error(rows: Sequence[Row], summary: MethodSummary, fatigue: Any, channels: Sequence[str]) -> str:
     rows = [row for row in rows if integrator_key(row) == summary.key and row["status"] == "done"]
-    columns = [f"del_error_{suffix}" for channel, _, suffix in fatigue if channel in channels]
-    errors = [100 * abs(error) for column in columns for error in numbers(rows, column)]
+    counted = {suffix for channel, _, suffix in fatigue if channel in channels}
+    errors = [
+        100 * abs(e)
+        for row in rows
+        for suffix, e in relevant_errors(row, fatigue).items()
+        if suffix in counted
+    ]
     if not errors:
         return ""
     return f"{max(errors):.2g}" if max(errors) >= 1e-3 else "< 0.001"

@@ -22,6 +22,7 @@ from fatigue_runner.results.cells import (
     text,
     truth,
 )
+from fatigue_runner.results.relevance import relevant_errors
 from fatigue_runner.results.unseen import Unseen, unseen
 
 # Good enough for engineering (well below the scatter between seeds), and good enough to validate against.
@@ -32,7 +33,7 @@ _DEL = re.compile(r"^del_(?!error_)(?P<channel>.+)_m(?P<exponent>\d+(?:\.\d+)?)$
 
 @dataclass(frozen=True)
 class DelError:
-    """The largest relative DEL error of one integrator and where it was met; `value` keeps its sign."""
+    """The largest DEL error of one integrator as it counts (`relevance`) and where it was met; `value` keeps its sign."""
 
     value: float
     channel: str
@@ -167,11 +168,13 @@ def wall_times_per_second(rows: Iterable[Row]) -> list[float]:
 def _del_errors(rows: list[Row], columns: list[tuple[str, float, str]]) -> list[DelError]:
     found = []
     for row in rows:
+        errors = relevant_errors(row, columns)
         for channel, exponent, suffix in columns:
-            value = number(row, f"del_error_{suffix}")
-            if value is not None:
+            if suffix in errors:
                 found.append(
-                    DelError(value, channel, exponent, text(row, "case_id"), number(row, "wind_speed"))
+                    DelError(
+                        errors[suffix], channel, exponent, text(row, "case_id"), number(row, "wind_speed")
+                    )
                 )
     return found
 
@@ -206,6 +209,19 @@ def cheapest_within(summaries: Iterable[MethodSummary], level: float) -> MethodS
     return min(good, key=lambda s: (_or_infinity(s.evaluations_per_second), _error_size(s)), default=None)
 
 
+def fastest_within(summaries: Iterable[MethodSummary], level: float) -> MethodSummary | None:
+    """The same by the measured time; the cheapest in evaluations where it is as fast to a tenth, which is how well a time is known."""
+    candidates = list(summaries)
+    good = [s for s in candidates if _competes(s) and _error_size(s) <= level and s.wall_time_per_second]
+    best, cheapest = (
+        min(good, key=lambda s: s.wall_time_per_second or 0.0, default=None),
+        cheapest_within(candidates, level),
+    )
+    if best is None or cheapest is None or not cheapest.wall_time_per_second:
+        return cheapest
+    return cheapest if cheapest.wall_time_per_second <= 1.1 * (best.wall_time_per_second or 0.0) else best
+
+
 def reference_of(summaries: Iterable[MethodSummary]) -> MethodSummary | None:
     """The reference's summary; None where the campaign ran without one."""
     return next((s for s in summaries if s.is_reference), None)
@@ -223,13 +239,15 @@ def answer(summaries: Sequence[MethodSummary], levels: Sequence[float] = LEVELS)
             else "none finished all its cases beside the reference"
         )
         return [f"No integrator can be judged: {why}.", *_casualties(summaries)]
-    winners: dict[MethodSummary | None, list[float]] = {}
+    winners: dict[tuple[MethodSummary | None, MethodSummary | None], list[float]] = {}
     for level in levels:
-        winners.setdefault(cheapest_within(tested, level), []).append(level)
-    sentences = [
-        _nearest_sentence(tested, passed[0]) if best is None else _best_sentence(best, passed, reference)
-        for best, passed in winners.items()
-    ]
+        winners.setdefault((cheapest_within(tested, level), fastest_within(tested, level)), []).append(level)
+    sentences = []
+    for (best, fastest), passed in winners.items():
+        if best is None:
+            sentences.append(_nearest_sentence(tested, passed[0]))
+        else:
+            sentences.append(_best_sentence(best, fastest, passed, tested))
     return [*sentences, *_casualties(summaries)]
 
 
@@ -241,12 +259,23 @@ def _nearest_sentence(tested: list[MethodSummary], level: float) -> str:
     )
 
 
-def _best_sentence(best: MethodSummary, levels: list[float], reference: MethodSummary | None) -> str:
+def _best_sentence(
+    best: MethodSummary, fastest: MethodSummary | None, levels: list[float], tested: Sequence[MethodSummary]
+) -> str:
     within = " and within ".join(format_percent(level) for level in levels)
-    return (
+    said = (
         f"Cheapest within {within} DEL error: {best.label}, {_count(best.evaluations_per_second)} "
-        f"evaluations per simulated second{_saving(best, reference)}; its worst is {_worst(best)}."
+        f"evaluations per simulated second{_saving(best, levels, tested)}; its worst is {_worst(best)}."
     )
+    if fastest is None or fastest == best:
+        return said
+    times = f"{_microseconds(fastest)} µs per simulated second against {_microseconds(best)}"
+    return f"{said} Fastest, as measured here: {fastest.label}, {times}."
+
+
+def _microseconds(summary: MethodSummary) -> str:
+    time = summary.wall_time_per_second
+    return "unknown" if time is None else format_count(time * 1e6)
 
 
 def _worst(summary: MethodSummary) -> str:
@@ -258,11 +287,32 @@ def _count(value: float | None) -> str:
     return "unknown" if value is None else format_count(value)
 
 
-def _saving(best: MethodSummary, reference: MethodSummary | None) -> str:
-    if reference is None or not reference.evaluations_per_second or not best.evaluations_per_second:
+def _saving(best: MethodSummary, levels: list[float], tested: Sequence[MethodSummary]) -> str:
+    """What a corrector saves: against the cheapest method without one, not against a reference, whose step is anybody's choice."""
+    if not best.corrector:
         return ""
-    ratio = reference.evaluations_per_second / best.evaluations_per_second
-    return f", {format_count(ratio)} times fewer than the reference" if ratio >= 1.05 else ""
+    rival = cheapest_within([s for s in tested if not s.corrector], min(levels))
+    if rival is None:
+        return " (no method without a corrector is as good here)"
+    ratio = saving(best, rival)
+    return (
+        f", {format_count(ratio)} times fewer than {rival.label} without a corrector"
+        if ratio and ratio >= 1.05
+        else ""
+    )
+
+
+def saving(summary: MethodSummary, rival: MethodSummary | None) -> float | None:
+    """How many times fewer evaluations than another integrator's; None where either is unknown."""
+    if rival is None or not rival.evaluations_per_second or not summary.evaluations_per_second:
+        return None
+    return rival.evaluations_per_second / summary.evaluations_per_second
+
+
+def cheapest_classical(summaries: Iterable[MethodSummary]) -> MethodSummary | None:
+    """The cheapest integrator without a corrector at the strictest level that one meets: what others are compared with."""
+    classical = [s for s in summaries if not s.corrector and not s.is_reference]
+    return next((s for level in sorted(LEVELS) if (s := cheapest_within(classical, level))), None)
 
 
 def _casualties(summaries: Iterable[MethodSummary]) -> list[str]:

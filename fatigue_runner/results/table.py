@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fatigue_runner.encoded import decoded
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.results.columns import NEEDED, kind_of
@@ -17,6 +19,8 @@ from fatigue_runner.results.frames import to_arrow, to_pandas
 
 if TYPE_CHECKING:
     from fatigue_runner.results.lifetime import Life
+
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
 
 
 def known(value: Any) -> Any:
@@ -41,6 +45,7 @@ class Results:
     wall_time: float = 0.0
     report_error: str = ""
     life: Life | None = None
+    notes: list[str] = field(default_factory=list)  # what limits the figures, in sentences
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -93,6 +98,22 @@ class Results:
         write_atomically(self.out / "results.parquet", buffer.getvalue())
 
 
+def _rows(text: str) -> list[dict[str, str]]:
+    """The rows of a table, also of one that a spreadsheet has written again: with other separators, and then with decimal commas."""
+    heading = text.partition("\n")[0]
+    separator = max(",;\t", key=heading.count)
+    rows = list(csv.DictReader(io.StringIO(text, newline=""), delimiter=separator))
+    if separator == ",":
+        return rows
+    return [{key: _with_point(value) for key, value in row.items()} for row in rows]
+
+
+def _with_point(cell: Any) -> Any:
+    return (
+        cell.replace(",", ".") if isinstance(cell, str) and _DECIMAL_COMMA.fullmatch(cell.strip()) else cell
+    )
+
+
 def read_results(folder: Path) -> list[dict[str, str]]:
     """The rows of a run folder's `results.csv`, every cell as text (`cells` has their values).
 
@@ -102,9 +123,9 @@ def read_results(folder: Path) -> list[dict[str, str]]:
     if not table.is_file():
         raise InputError(f"{folder} holds no results.csv; give the output folder of `fatigue-runner run`")
     try:
-        with table.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        text = decoded(table.read_bytes(), table, "the results table")
+        rows = _rows(text)
+    except (OSError, csv.Error) as error:
         raise InputError(
             f"{table} cannot be read as CSV: {error}; run the campaign again to rewrite it"
         ) from None

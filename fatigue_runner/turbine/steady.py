@@ -26,6 +26,11 @@ class Equations(Protocol):
     @property
     def layout(self) -> Layout: ...
 
+    @property
+    def way_out(self) -> str:
+        """What to do where there is no steady rotation."""
+        ...
+
     def guesses(self, wind: float) -> tuple[list[tuple[float, Array]], float]:
         """(rotor speed [rad/s], first-order states) to start from, the best first; and the slowest speed that is operation."""
         ...
@@ -146,7 +151,7 @@ def _steady(
             return found.x * scale
     raise InputError(
         f"{turbine.name} has no steady rotation at {wind:g} m/s and {np.degrees(pitch):g} deg pitch; "
-        "give `initial` explicitly"
+        f"{turbine.way_out}"
     )
 
 

@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from fatigue_runner.control import Submodel
 from fatigue_runner.control.section import control_section
 from fatigue_runner.errors import InputError, did_you_mean
-from fatigue_runner.layout import DEFAULT_FAMILY, FAMILIES, HARMONICS, Channel, Layout
+from fatigue_runner.layout import DEFAULT_FAMILY, FAMILIES, HARMONICS, RPM, Channel, Layout
 from fatigue_runner.rotor import SQUARE, Rotor
 from fatigue_runner.turbine.dynamics import CONTROLLED_BY, UNCONTROLLED, Dynamics
 from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turbine_file
 from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters
+from fatigue_runner.turbine.rated import rated_rotor_speed
 from fatigue_runner.turbine.rigid import RigidRotor
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
 
@@ -81,6 +82,17 @@ class Turbine:
                 "add one (compare nrel5mw.yaml) or use operation: fixed"
             )
         return _operated(self, operation)
+
+    @property
+    def way_out(self) -> str:
+        """What to do in a wind in which there is no steady rotation."""
+        rated = rated_rotor_speed(self)
+        if self.operation != FIXED or rated is None:
+            return "take another wind or pitch, or give `initial` explicitly"
+        return (
+            f"a fixed pitch has no controller that holds the rated {RPM * rated:.3g} rpm: use operation: controlled, a larger pitch or "
+            "less wind"
+        )
 
     @property
     def controller(self) -> Submodel | None:

@@ -184,8 +184,8 @@ class FileSection(WindSection):
                 digest = hashlib.sha256(path.read_bytes()).hexdigest()
             except OSError as error:
                 raise InputError(
-                    f"{site.place.where('files', index)}: wind file {name!r} cannot be read ({error.strerror}); "
-                    "paths start at the campaign file"
+                    f"{site.place.where('files', index)}: wind file {name!r} cannot be read ({error.strerror}); looked for "
+                    f"{path}, since paths start at the campaign file"
                 ) from None
             if path.suffix.lower() in SUFFIXES:
                 what = f"{name!r} is a wind field (TurbSim, Bladed, HAWC2, mostly binary), no csv file"

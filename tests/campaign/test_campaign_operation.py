@@ -113,3 +113,45 @@ def test_a_controller_begins_as_if_a_given_start_had_been_so_for_long(initial):
     assert wind.initial[15] > 0 and wind.initial[16] == wind.initial[15] and wind.initial[17] == 0
     if not isinstance(initial, str):
         assert list(wind.initial[:16]) == initial
+
+
+FIXED = {
+    "name": "fixed",
+    "duration": 20,
+    "integrators": [{"method": "rk4", "step": 0.02}],
+    "reference": None,
+    "workers": 1,
+    "log": {"enabled": False},
+}
+
+
+def test_a_fixed_pitch_is_told_before_the_run_with_what_rated_is_and_which_winds_are_above():
+    notes = make_plan({**FIXED, "wind": {"speeds": [8, 14]}}).notes
+    assert notes[0].startswith("The pitch is fixed") and "rated is 12.1 rpm" in notes[0]
+    assert "in some 11 m/s, and 1 of 2 winds are above" in notes[0]
+    assert not any("The pitch is fixed" in note for note in make_plan(CAMPAIGN).notes)
+
+
+def test_a_wind_that_nothing_holds_is_refused_with_the_controller_as_the_way_out():
+    """It once advised a start of one's own, which led to 128 rpm and a verdict."""
+    with pytest.raises(
+        InputError, match=r"no steady rotation at 18 m/s.*rated 12\.1 rpm.*operation: controlled"
+    ) as refused:
+        make_plan({**FIXED, "wind": {"speeds": 18}})
+    assert "initial" not in str(refused.value)
+
+
+def test_tables_and_speeds_that_were_left_are_told_in_terminal_and_report(tmp_path, capsys):
+    from rich.console import Console
+
+    from fatigue_runner.cli import _print_outcome
+
+    times = "".join(f"{i},{max(8 - i, 0.4)}\n" for i in range(21))
+    (tmp_path / "calm.csv").write_text(f"time,wind_speed\n{times}")
+    wind = {"type": "file", "files": str(tmp_path / "calm.csv")}
+    results = run_campaign({**FIXED, "wind": wind}, tmp_path / "run")
+    _print_outcome(results, Console(width=400))
+    told = "1 of 1 cases left the range of the aerodynamic tables"
+    assert told in capsys.readouterr().out
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert told in page and "no controller limits the rotor&#39;s speed; rated is 12.1 rpm" in page

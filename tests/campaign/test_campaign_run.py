@@ -11,13 +11,17 @@ import pytest
 from campaign_world import CAMPAIGN, build_world, write_campaign
 from ruamel.yaml import YAML
 
-from fatigue_runner.campaign import CampaignInterrupted, run_campaign
+from fatigue_runner.campaign import CampaignInterrupted, run, run_campaign
+from fatigue_runner.campaign.pieces import Pieces, leave
 from fatigue_runner.campaign.plan import make_plan
+from fatigue_runner.campaign.progress import _minutes
+from fatigue_runner.campaign.store import Store
 from fatigue_runner.channels import FATIGUE_CHANNELS
-from fatigue_runner.errors import InputError
+from fatigue_runner.errors import FatigueRunnerError, InputError
 from fatigue_runner.fatigue import damage_equivalent_load, short_term_cycles
 from fatigue_runner.logbook import read_log
 from fatigue_runner.results.columns import columns
+from fatigue_runner.results.table import read_results
 
 
 @pytest.fixture
@@ -183,14 +187,15 @@ def test_an_interruption_keeps_the_finished_blocks_and_the_next_run_does_the_res
     world, tmp_path, out, monkeypatch
 ):
     campaign = write_campaign(tmp_path, CAMPAIGN.replace("[6, 8, 10]", "{start: 5, stop: 9.9, step: 0.1}"))
-    advance, seen = "fatigue_runner.campaign.progress.Progress.advance", []
+    add, seen = Store.add, []
 
     def stop_after_two(self, records):
+        add(self, records)
         seen.append(len(records))
         if len(seen) == 2:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(advance, stop_after_two)
+    monkeypatch.setattr(Store, "add", stop_after_two)
     with pytest.raises(
         CampaignInterrupted, match=r"of 200 cases are finished; the same command runs the rest"
     ) as error:
@@ -391,7 +396,7 @@ REFUSED = {
     "missing wind file": (
         "speeds: [6, 8, 10]",
         "type: file\n  files: gone.csv",
-        "toy.yaml:7: wind file 'gone.csv' cannot be read (No such file or directory); paths start at the campaign file",
+        "toy.yaml:7: wind file 'gone.csv' cannot be read (No such file or directory); looked for ",
     ),
 }
 
@@ -460,3 +465,193 @@ def test_dask_without_its_package_is_refused_with_the_pip_command(world, campaig
     with pytest.raises(InputError, match="pip install distributed"):
         run_campaign(campaign, out, dask="tcp://localhost:8786")
     assert not out.exists()
+
+
+def _looped(tmp_path):
+    (tmp_path / "a").symlink_to(tmp_path / "b")
+    (tmp_path / "b").symlink_to(tmp_path / "a")
+    return tmp_path / "a" / "x"
+
+
+def _below_a_file(tmp_path):
+    (tmp_path / "file").write_text("")
+    return tmp_path / "file" / "x"
+
+
+def _dangling(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere" / "else")
+    return tmp_path / "link"
+
+
+OUTS = {
+    "long name": (lambda tmp_path: tmp_path / ("b" * 300), "too long"),
+    "long name of two bytes a letter": (lambda tmp_path: tmp_path / ("ж" * 200), "too long"),
+    "below a file": (_below_a_file, "is a file, not a folder"),
+    "circle": (_looped, "circle|levels of symbolic links"),
+    "link to nowhere": (_dangling, "leads nowhere"),
+}
+
+
+@pytest.mark.parametrize(("place", "message"), OUTS.values(), ids=OUTS)
+def test_a_run_folder_that_cannot_be_is_refused_before_anything_runs(world, tmp_path, place, message):
+    with pytest.raises(InputError, match=message):
+        run_campaign(write_campaign(tmp_path), place(tmp_path))
+    assert world.calls == []
+
+
+def test_a_campaign_behind_a_link_finds_what_lies_beside_the_link_and_beside_the_file(world, tmp_path):
+    """As annexes and stow make them."""
+    (tmp_path / "store").mkdir(), (tmp_path / "project").mkdir()
+    wind = "  type: file\n  files: [beside-link.csv, beside-file.csv]"
+    path = write_campaign(tmp_path / "store", CAMPAIGN.replace("  speeds: [6, 8, 10]", wind))
+    link = tmp_path / "project" / "mine.yaml"
+    link.symlink_to(path)
+    for folder, name in (("project", "beside-link"), ("store", "beside-file")):
+        (tmp_path / folder / f"{name}.csv").write_text("time,wind_speed\n0,8\n10,9\n")
+    assert len(run_campaign(link, tmp_path / "run")) == 2 * 4
+    (tmp_path / "project" / "beside-link.csv").unlink()
+    with pytest.raises(InputError, match=f"looked for {tmp_path}/project/beside-link.csv"):
+        run_campaign(link, tmp_path / "other")
+
+
+def test_a_case_name_that_no_file_can_have_is_refused(world, tmp_path, monkeypatch):
+    monkeypatch.setattr("fatigue_runner.campaign.cases.LONGEST_NAME", 20)
+    with pytest.raises(InputError, match="name of more than 20 bytes"):
+        run_campaign(write_campaign(tmp_path), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_worker_that_is_ended_from_outside_is_told_and_the_same_command_goes_on(
+    world, tmp_path, monkeypatch
+):
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    from fatigue_runner.campaign import run as module
+
+    campaign, folder = write_campaign(tmp_path), tmp_path / "run"
+    real = module.run_block
+
+    def killed(job):
+        if len(world.calls) > 3:
+            raise TerminatedWorkerError("SIGKILL")
+        return real(job)
+
+    monkeypatch.setattr("fatigue_runner.campaign.plan.BLOCK_SIZE", 1)
+    monkeypatch.setattr(module, "run_block", killed)
+    with pytest.raises(
+        FatigueRunnerError, match=r"want of memory; 4 of 12 cases are finished and kept.*--workers"
+    ) as told:
+        run_campaign(campaign, folder)
+    assert told.value.exit_code == 1
+    monkeypatch.setattr(module, "run_block", real)
+    assert run_campaign(campaign, folder).kept == 4
+
+
+@pytest.mark.parametrize("how", ["mark", "semicolons", "tabs in UTF-16"])
+def test_a_table_that_went_through_a_spreadsheet_is_the_same_table(world, tmp_path, how):
+    folder = tmp_path / "run"
+    results = run_campaign(write_campaign(tmp_path), folder)
+    before = read_results(folder)
+    table = folder / "results.csv"
+    rows = list(csv.reader(table.read_text().splitlines()))
+    if how == "mark":
+        table.write_bytes(b"\xef\xbb\xbf" + table.read_bytes().replace(b"\n", b"\r\n"))
+    elif how == "semicolons":  # of a country that writes decimal commas
+        table.write_text(
+            "\n".join(";".join(c.replace(".", ",") if is_number(c) else c for c in row) for row in rows),
+            "utf-8-sig",
+        )
+    else:
+        table.write_text("\n".join("\t".join(row) for row in rows), "utf-16")
+    assert read_results(folder) == before and len(before) == len(results)
+
+
+def is_number(cell):
+    try:
+        return bool(float(cell) + 1)
+    except ValueError:
+        return False
+
+
+@pytest.mark.parametrize("diverged_at", [1.0, 2.0, 2.02])
+def test_a_case_that_diverges_before_the_counted_time_costs_no_report(monkeypatch, tmp_path, diverged_at):
+    world = build_world(monkeypatch)
+    world.diverging[("heun", 8.0)] = diverged_at
+    results = run_campaign(write_campaign(tmp_path, discard="2"), tmp_path / "run")
+    assert results.report_error == "" and len(results.lost) == 2
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "Time histories" in page and "x_FA" in page
+
+
+def test_what_is_finished_of_a_block_is_not_done_again(world, tmp_path, monkeypatch):
+    """Ctrl-C once lost all of a block: 285 finished logs."""
+    from fatigue_runner.campaign import block
+
+    finish = block._finish
+    finished = []
+
+    def interrupted(job, case, *rest):
+        if len(finished) == 7:
+            raise KeyboardInterrupt
+        finished.append(case.id)
+        return finish(job, case, *rest)
+
+    monkeypatch.setattr(block, "_finish", interrupted)
+    campaign, folder = write_campaign(tmp_path), tmp_path / "run"
+    with pytest.raises(CampaignInterrupted, match="7 of 12 cases are finished"):
+        run_campaign(campaign, folder)
+    assert not (folder / "finished").exists()
+    monkeypatch.setattr(block, "_finish", finish)
+    again = run_campaign(campaign, folder)
+    assert (again.kept, again.simulated) == (7, 5)
+
+
+def test_what_a_killed_run_had_finished_is_taken_in(world, tmp_path):
+    """Its own process had no time to do so; half a line is none."""
+    campaign, folder = write_campaign(tmp_path), tmp_path / "run"
+    run_campaign(campaign, folder)
+    lines = (folder / "cases.jsonl").read_bytes().splitlines(keepends=True)
+    (folder / "cases.jsonl").write_bytes(b"".join(lines[:2]))
+    (folder / "finished").mkdir()
+    (folder / "finished" / "a.jsonl").write_bytes(b"".join(lines[2:8]) + lines[8][:50])
+    again = run_campaign(campaign, folder)
+    assert again.kept == 8 and not (folder / "finished").exists()
+
+
+def test_cases_count_one_by_one_while_their_block_runs(tmp_path):
+    pieces = Pieces(tmp_path)
+    for name in ("a", "b"):
+        leave(tmp_path, "block", {"row": {"case_id": name}})
+        assert [record["row"]["case_id"] for record in pieces.new()] == [name]
+    assert pieces.new() == []
+
+
+def test_logs_that_left_the_campaign_are_told(world, tmp_path):
+    folder = tmp_path / "run"
+    run_campaign(write_campaign(tmp_path), folder)
+    plan = make_plan(write_campaign(tmp_path, CAMPAIGN.replace("[6, 8, 10]", "[6, 8]")))
+    store = Store(folder, plan.identity)
+    told = run._before(plan, store, 0)
+    assert len(told) == 1 and told[0].startswith("4 logs (") and "v10.00_" in told[0]
+
+
+def test_a_large_run_says_what_its_logs_will_take(world, tmp_path):
+    big = CAMPAIGN.replace("duration: 10", "duration: 36000").replace(
+        "[6, 8, 10]", "{start: 5, stop: 24, count: 100}"
+    )
+    plan = make_plan(write_campaign(tmp_path, big))
+    (tmp_path / "new").mkdir()
+    (said,) = run._before(plan, Store(tmp_path / "new", plan.identity), len(plan.cases))
+    assert said.startswith("the logs of 400 cases will take about") and "GB are free" in said
+
+
+def test_the_estimate_of_a_log_is_not_far_off(world, tmp_path):
+    results = run_campaign(write_campaign(tmp_path, duration="200"), tmp_path / "run")
+    plan = make_plan(write_campaign(tmp_path, duration="200"))
+    sizes = [path.stat().st_size for path in (tmp_path / "run" / "logs").glob("*.mcap")]
+    assert len(results) == len(sizes) and 0.4 < np.mean(sizes) / plan.log_bytes < 2.0
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(22.3, "22 s"), (185, "3:05 min"), (3725, "1:02 h")])
+def test_times_are_short_enough_to_be_read(seconds, text):
+    assert _minutes(seconds) == text

@@ -81,7 +81,7 @@ def test_a_wind_from_a_file_is_in_the_table_by_the_file_s_name_and_notes_are_tol
     )
     wind = {"type": "full-field", "files": [str(field)], "harmonics": 6}
     campaign = TURBULENT | {"wind": wind, "reference": None}
-    (note,) = make_plan(campaign).notes
+    _, note = make_plan(campaign).notes  # the first: a fixed pitch has no controller
     assert "coarse.bts: points every 25 m hold azimuthal harmonics up to 5 on this rotor" in note
     (row,) = run_campaign(campaign, tmp_path / "out")
     assert row["wind_file"] == "coarse.bts" and row["wind_source"] == "full-field" and row["seed"] is None

@@ -128,3 +128,10 @@ def test_a_name_of_another_turbine_is_refused():
     with pytest.raises(CorrectorError, match="was trained for turbine other"):
         binding = replace(trained().binding, turbine="other", turbine_hash="0" * 64)
         replace(trained(), binding=binding).bind(turbine(), "heun", 0.02)
+
+
+def test_a_git_lfs_pointer_is_told_as_one(tmp_path):
+    path = tmp_path / "a.safetensors"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12345\n")
+    with pytest.raises(CorrectorError, match="Git LFS pointer"):
+        load(path)

@@ -7,7 +7,8 @@ import pytest
 from simulating import simulate_block
 from smooth_turbine import smooth_turbine, smooth_wind
 
-from fatigue_runner.errors import InputError
+import fatigue_runner as fr
+from fatigue_runner.errors import FatigueRunnerWarning, InputError
 from fatigue_runner.integrators import METHODS, method, stability_limit
 from fatigue_runner.integrators.adams import LinearMultistep
 from fatigue_runner.integrators.exponential_adams import ExponentialAdams
@@ -323,3 +324,26 @@ def test_multistep_growth_of_the_exact_solution_is_that_of_the_exponential():
         assert method(name).growth(z) == pytest.approx(np.abs(np.exp(z)), abs=1e-8)
     # Hairer & Wanner (2010), Solving ODEs II, V.1: AB4's real stability interval is (-3/10, 0)
     assert method("ab4").growth(np.array([-0.2999])) <= 1.0 < method("ab4").growth(np.array([-0.3001]))
+
+
+def test_a_diverged_trajectory_says_so():
+    """Its loads once gave a damage-equivalent load of 8.8e7 N m without a word."""
+    with pytest.warns(
+        FatigueRunnerWarning,
+        match=r"rk4 500 ms diverged at .* of 20 s: the trajectory ends there.*no fatigue",
+    ):
+        run = fr.simulate("nrel5mw", 8.0, "rk4", 0.5, 20.0)
+    assert run.diverged_at is not None and run.time[-1] < 20.0
+
+
+def test_a_pitch_in_degrees_is_told():
+    with pytest.raises(InputError, match=r"pitch is in rad: 5 rad are 286 deg; give math.radians\(5\)"):
+        fr.simulate("nrel5mw", 8.0, "rk4", 0.05, 1.0, pitch=5)
+
+
+def test_a_corrector_is_guarded_from_python_as_in_a_campaign():
+    from inspect import signature
+
+    from fatigue_runner.campaign.spec import IntegratorSection
+
+    assert signature(fr.simulate).parameters["mode"].default == IntegratorSection.model_fields["mode"].default

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,13 +12,15 @@ import pytest
 from google.protobuf import descriptor_pb2
 from logbook_example import MORE, RUN, differing, example, same_bits, with_states
 from mcap.reader import make_reader
-from mcap.records import Schema
-from mcap.writer import CompressionType, Writer
+from mcap.records import Attachment, Header, Schema
+from mcap.writer import CompressionType, IndexType, Writer
 from places import ROOT
 
 from fatigue_runner import channels
-from fatigue_runner.logbook import LogError, check, read_log, write_log
+from fatigue_runner.logbook import LogError, check, read_log, recover, write_log
+from fatigue_runner.logbook.container import MAGIC, encode
 from fatigue_runner.logbook.generic import message_class
+from fatigue_runner.logbook.metadata import read_metadata
 from fatigue_runner.logbook.schema import TOPICS, Field
 
 
@@ -158,3 +161,81 @@ def test_the_ten_lines_of_python_in_the_manual_work(tmp_path, monkeypatch, capsy
     assert len(blocks) == 2 and max(block.count("\n") for block in blocks) <= 10
     flap = example(3).loads["blade1_root_flapwise_moment"]
     assert str(flap[2]) in capsys.readouterr().out
+
+
+# what the format leaves to the writer
+WRITERS = {
+    "no indexes": {"index_types": IndexType.NONE},
+    "no message indexes": {"index_types": IndexType.CHUNK},
+    "no statistics": {"use_statistics": False},
+    "no chunks": {"use_chunking": False},
+    "no checksums": {"enable_crcs": False},
+    "nothing repeated": {"repeat_channels": False, "repeat_schemas": False, "use_summary_offsets": False},
+    "no summary": {
+        "index_types": IndexType.NONE, "use_statistics": False, "repeat_channels": False, "repeat_schemas": False
+    },
+}  # fmt: skip
+
+
+def _copy(source: Path, out: Path, backwards: bool = False, **options: object) -> Path:
+    """The same records by the library's writer."""
+    with open(source, "rb") as stream, open(out, "wb") as target:
+        reader = make_reader(stream)
+        writer = Writer(target, chunk_size=5_000, **options)
+        writer.start()
+        ids: dict[str, int] = {}
+        messages = list(reader.iter_messages())
+        for schema, channel, message in reversed(messages) if backwards else messages:
+            if channel.topic not in ids:
+                schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
+                ids[channel.topic] = writer.register_channel(channel.topic, "protobuf", schema_id)
+            writer.add_message(
+                ids[channel.topic], message.log_time, message.data, message.log_time, message.sequence
+            )
+        for metadata in reader.iter_metadata():
+            writer.add_metadata(metadata.name, metadata.metadata)
+        writer.finish()
+    return out
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("options", WRITERS.values(), ids=WRITERS)
+def test_what_the_format_leaves_to_the_writer_is_no_damage(tmp_path, options, backwards):
+    trajectory = example(100)
+    path = _copy(write_log(tmp_path / "a.mcap", trajectory, RUN), tmp_path / "b.mcap", backwards, **options)
+    assert check(path).problems == []
+    log = read_log(path)
+    assert differing(log, trajectory) == [] and log.complete
+    assert read_metadata(path)["run"].items() >= RUN.items()
+    assert not recover(path).changed
+
+
+def test_what_another_writer_says_is_still_checked(tmp_path):
+    """Optional is not arbitrary: a count that is there must be right."""
+    path = _copy(write_log(tmp_path / "a.mcap", example(100)), tmp_path / "b.mcap", enable_crcs=False)
+    data = path.read_bytes()
+    with open(path, "rb") as stream:
+        statistics = make_reader(stream).get_summary().statistics
+    place = data.rindex(struct.pack("<Q", statistics.message_count), 0, len(data) - 28)
+    path.write_bytes(data[:place] + struct.pack("<Q", 7) + data[place + 8 :])
+    assert check(path).problems == ["the summary's message counts are not what the file holds"]
+
+
+def test_a_record_may_be_longer_than_this_version_of_the_format_knows(tmp_path):
+    """Readers skip what stands behind the fields they know: here three bytes behind an attachment's checksum."""
+    body = encode(Attachment(1, 2, "myFile", "text/plain", b"abc"))[9:]
+    end = struct.pack("<BQI", 15, 4, 0) + struct.pack("<BQQQI", 2, 20, 0, 0, 0) + MAGIC
+    path = tmp_path / "padded.mcap"
+    for pad, wrong in ((b"", 0), (b"\x01\xff\xff", 0), (b"\x01\xff\xff", 1)):
+        content = body.replace(b"abc", b"abd") if wrong else body
+        record = struct.pack("<BQ", 9, len(content + pad)) + content + pad
+        path.write_bytes(MAGIC + encode(Header("", "")) + record + end)
+        assert len(check(path).problems) == wrong
+
+
+def test_a_git_lfs_pointer_is_told_as_one(tmp_path):
+    path = tmp_path / "a.mcap"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 12345\n")
+    for look in (read_log, check, recover, read_metadata):
+        with pytest.raises(LogError, match=r"Git LFS pointer.*git lfs pull"):
+            look(path)

@@ -5,14 +5,21 @@ from __future__ import annotations
 from fatigue_runner.report.blocks import Column, Paragraph, Section, Table, TableRow
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.results.cells import format_count, format_error, format_percent
-from fatigue_runner.results.ranking import LEVELS, MethodSummary, answer, cheapest_within
+from fatigue_runner.results.ranking import (
+    LEVELS,
+    MethodSummary,
+    answer,
+    cheapest_classical,
+    cheapest_within,
+    saving,
+)
 
 ORDER = 10
 
 COLUMNS = (
     Column("Integrator", number=False),
     Column("Cost", "evaluations per simulated s"),
-    Column("Fewer than reference", "times"),
+    Column("Fewer than the best classical", "times"),
     Column("Measured", "µs per simulated s"),
     Column("State error", "NRMSE, median"),
     Column("State error", "NRMSE, worst"),
@@ -29,7 +36,13 @@ def build(run: Run) -> Section:
     winners = [cheapest_within(run.integrators, level) for level in LEVELS]
     rows = [TableRow(_cells(run, s), _mark(s, winners)) for s in run.summaries]
     lead = [Paragraph(_unbroken(sentence), strong=i == 0) for i, sentence in enumerate(sentences)]
-    caption = CAPTION + (UNSEEN if any(s.unseen for s in run.summaries) else "")
+    best = cheapest_classical(run.summaries)
+    compared = (
+        ""
+        if best is None
+        else f" Best classical: {best.label}, the cheapest without a corrector at the strictest level met."
+    )
+    caption = CAPTION + compared + (UNSEEN if any(s.unseen for s in run.summaries) else "")
     return Section(
         "Which integrator is good enough, and what does it cost?", [*lead, Table(COLUMNS, rows, caption)]
     )
@@ -46,19 +59,12 @@ UNSEEN = " * Some winds lie outside those that the corrector was trained on, see
 
 
 def _cells(run: Run, s: MethodSummary) -> list[str]:
-    saving = None
-    if (
-        run.reference
-        and run.reference.evaluations_per_second
-        and s.evaluations_per_second
-        and not s.is_reference
-    ):
-        saving = run.reference.evaluations_per_second / s.evaluations_per_second
+    fewer = None if s.is_reference else saving(s, cheapest_classical(run.summaries))
     worst = s.worst_del_error
     return [
         s.label + (" (reference)" if s.is_reference else " ●" if s.on_front else ""),
         _shown(s.evaluations_per_second),
-        _shown(saving),
+        _shown(fewer),
         _shown(None if s.wall_time_per_second is None else s.wall_time_per_second * 1e6),
         format_error(s.nrmse_median),
         format_error(s.nrmse_worst),

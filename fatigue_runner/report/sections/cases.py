@@ -6,6 +6,7 @@ from fatigue_runner.report.blocks import Block, Column, Paragraph, Section, Tabl
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.sections.limits import lost_share
 from fatigue_runner.results.cells import Row, format_error, format_percent, integrator, number, text, truth
+from fatigue_runner.results.relevance import relevant_errors
 
 ORDER = 70
 MOST = 200  # rows on paper; the rest is in results.csv
@@ -99,5 +100,4 @@ def _whole(row: Row, column: str) -> str:
 
 def _worst(run: Run, row: Row) -> float | None:
     """The largest size of the row's DEL errors."""
-    sizes = [abs(v) for _, _, suffix in run.columns if (v := number(row, f"del_error_{suffix}")) is not None]
-    return max(sizes, default=None)
+    return max((abs(value) for value in relevant_errors(row, run.columns).values()), default=None)

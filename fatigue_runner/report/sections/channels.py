@@ -9,8 +9,9 @@ from fatigue_runner.report.blocks import Block, Column, Section, Table, TableRow
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.sections.limits import rows_of
 from fatigue_runner.report.selection import left_out, shown_integrators
-from fatigue_runner.results.cells import Row, format_error, format_percent, number, numbers
+from fatigue_runner.results.cells import Row, format_error, format_percent, numbers
 from fatigue_runner.results.ranking import MethodSummary
+from fatigue_runner.results.relevance import relevant_errors
 
 ORDER = 60
 
@@ -34,18 +35,19 @@ def _dels(run: Run) -> Table:
         for s in compared
     ]
     caption = (
-        "Worst DEL error of each channel over all winds and exponents, with its sign; finished cases only."
+        "Worst DEL error of each channel over all winds and exponents, with its sign; finished cases only. As in the verdict, see the "
+        "definition of DEL error."
     )
     return Table([Column("Integrator", number=False), *heads], rows, caption)
 
 
 def _worst(run: Run, rows: list[Row], channel: str) -> str:
+    exponents = {suffix: exponent for name, exponent, suffix in run.columns if name == channel}
     found = [
-        (value, exponent)
-        for name, exponent, suffix in run.columns
-        if name == channel
+        (value, exponents[suffix])
         for row in rows
-        if (value := number(row, f"del_error_{suffix}")) is not None
+        for suffix, value in relevant_errors(row, run.columns).items()
+        if suffix in exponents
     ]
     if not found:
         return "–"

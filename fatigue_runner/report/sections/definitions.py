@@ -8,6 +8,7 @@ from fatigue_runner.channels import BY_NAME
 from fatigue_runner.report.blocks import Definitions, Section
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.results.life_words import place_label
+from fatigue_runner.results.relevance import FLOOR
 
 ORDER = 90
 
@@ -31,7 +32,9 @@ def build(run: Run) -> Section:
         ("Channels", _channels(run)),
         (
             "DEL error",
-            "(DEL − DEL_ref) / DEL_ref of the same wind. An error e of the load is about m·e of the damage.",
+            "(DEL − DEL_ref) / DEL_ref of the same wind. An error e of the load is about m·e of the damage. Where DEL_ref is below "
+            f"{FLOOR:.0%} of the largest mean load or DEL at the same place (tower base, blade root), verdicts and tables here take the "
+            "error over that instead: it matters to nobody. results.csv has it over DEL_ref always.",
         ),
         (
             "Damage ratio",

@@ -40,12 +40,19 @@ def build(run: Run) -> Section:
     caption = (
         f"Tower-top fore-aft displacement x_FA at {len(winds)} winds of the campaign (above), and its "
         f"distance from the reference {run.reference.label} (below; running maximum over {ENVELOPE:g} s). "
-        "A curve that ends in × diverged there." + left_out(run, shown)
+        f"A curve that ends in × diverged there{_whole(run)}." + left_out(run, shown)
     )
     return Section(
         title,
         [Figure(_draw(run, winds, shown), caption, "Time histories of tower-top fore-aft displacement")],
     )
+
+
+def _whole(run: Run) -> str:
+    """How much of the time is shown, where it is not all."""
+    begin = float(run.setting("discard", 0.0))
+    counted = float(run.setting("duration", WINDOW)) - begin
+    return f"; the first {WINDOW:g} s of the {counted:g} s that count are shown" if counted > WINDOW else ""
 
 
 def _series(run: Run, wind: WindCase, summary: MethodSummary | None) -> tuple[np.ndarray, np.ndarray] | None:
@@ -55,6 +62,8 @@ def _series(run: Run, wind: WindCase, summary: MethodSummary | None) -> tuple[np
         return None
     start = min(float(run.setting("discard", 0.0)), float(log.time[-1]))
     inside = (log.time >= start) & (log.time <= start + WINDOW)
+    if inside.sum() < 2:  # it diverged before or as the counted time began
+        return None
     return np.asarray(log.time)[inside], np.asarray(log.state)[inside, STATE_NAMES.index(STATE)]
 
 

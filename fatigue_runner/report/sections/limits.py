@@ -7,9 +7,10 @@ from typing import Any
 
 from fatigue_runner.report.blocks import Section, Warnings
 from fatigue_runner.report.rundata import Run
-from fatigue_runner.results.cells import Row, format_percent, number, text
+from fatigue_runner.results.beyond import beyond, no_pitch_control
+from fatigue_runner.results.cells import Row, format_percent, text
 from fatigue_runner.results.operation import pitch_rate_sentences
-from fatigue_runner.results.ranking import unseen_winds
+from fatigue_runner.results.ranking import LEVELS, unseen_winds
 
 ORDER = 20
 NEAR = 10.0  # times what is known of the reference: errors below are its own as likely as the integrator's
@@ -19,7 +20,7 @@ SHORT = 600.0  # s; the length of a load case in IEC 61400-1
 def build(run: Run) -> Section | None:
     """The warnings of this run; None where there are none."""
     items = [
-        *_clamped(run),
+        *_operation(run),
         *pitch_rate_sentences(run.rows),
         *_lost(run),
         *unseen_winds(run.summaries),
@@ -41,18 +42,10 @@ def rows_of(run: Run, key: tuple[Any, ...]) -> list[Row]:
     return [row for row in run.rows if integrator_key(row) == key]
 
 
-def _clamped(run: Run) -> list[str]:
-    clamped = [(row, count) for row in run.rows if (count := number(row, "clamped_lookups"))]
-    if not clamped:
-        return []
-    speeds = sorted({speed for row, _ in clamped if (speed := number(row, "wind_speed")) is not None})
-    at = f", at hub winds from {speeds[0]:.3g} to {speeds[-1]:.3g} m/s" if speeds else ""
-    total = sum(count for _, count in clamped)
-    return [
-        f"{len(clamped)} of {len(run.rows)} cases left the range of the aerodynamic tables ({total:.0f} "
-        f"look-ups in all{at}). Outside it the nearest tabulated value is taken: the loads there are not "
-        "those of the turbine."
-    ]
+def _operation(run: Run) -> list[str]:
+    rated = float(run.fact("rated_rotor_speed") or 0.0) or None
+    fixed = [no_pitch_control(rated)] if run.setting("operation") == "fixed" else []
+    return [*beyond(run.rows, rated), *fixed]
 
 
 def _lost(run: Run) -> list[str]:
@@ -79,16 +72,18 @@ def _uncompared(run: Run) -> list[str]:
 
 
 def _unresolved(run: Run) -> list[str]:
-    """Integrators whose errors are not far above what is known of the reference's own."""
+    """Integrators whose DEL errors are not far above what is known of the reference's own, where that could change a verdict."""
     try:
-        known = float(run.fact("reference_nrmse"))
+        known = float(run.fact("reference_del_error"))
     except ValueError:
         return []
-    near = [s for s in run.integrators if s.nrmse_median is not None and s.nrmse_median < NEAR * known]
-    if not near:
+    near = [
+        s for s in run.integrators if s.worst_del_error is not None and s.worst_del_error.size < NEAR * known
+    ]
+    if not near or NEAR * known < min(LEVELS):
         return []
     return [
-        f"The reference is known to an NRMSE of {known:.0e} only ({run.fact('reference_agreement')}). The errors of "
+        f"The loads of the reference are known to {format_percent(known)} only ({run.fact('reference_agreement')}). The DEL errors of "
         f"{', '.join(s.label for s in near)} are less than {NEAR:g} times that and may be the reference's own: give the reference "
         "a smaller step."
     ]
