@@ -46,6 +46,22 @@ _BY_OPERATION = (
 
 LOADS = (*_BY_EQUATIONS, *_BY_OPERATION)
 EQUATION_LOADS = tuple(c.name for c in _BY_EQUATIONS)
+# OpenFAST's names of the same quantities, which are understood wherever a channel is named.
+OPENFAST = {
+    "TwrBsMyt": "tower_base_fore_aft_moment", "TwrBsMxt": "tower_base_side_side_moment",
+    **{f"RootMyb{b}": f"blade{b}_root_flapwise_moment" for b in (1, 2, 3)},
+    **{f"RootMxb{b}": f"blade{b}_root_edgewise_moment" for b in (1, 2, 3)},
+    "LSShftMxa": "low_speed_shaft_torque", "RtAeroFxh": "rotor_thrust", "GenTq": "generator_torque",
+    **{f"OoPDefl{b}": f"blade{b}_tip_out_of_plane" for b in (1, 2, 3)},
+    **{f"IPDefl{b}": f"blade{b}_tip_in_plane" for b in (1, 2, 3)},
+}  # fmt: skip
+_LOWER = {name.lower(): ours for name, ours in OPENFAST.items()}
+
+
+def channel_name(name: str) -> str:
+    """This program's name of a channel that may be called by OpenFAST's, in upper or lower case; any other name as it is."""
+    return _LOWER.get(name.lower(), name)
+
 
 STATE_NAMES = tuple(c.name for c in STATES)
 WIND_NAMES = tuple(c.name for c in WIND_SIGNALS)

@@ -47,7 +47,6 @@ def build_world(monkeypatch: Any) -> World:
         watched={},
         name="toy",
         hash="0" * 64,
-        control=None,
         parameters={"g_ratio": 97.0},
         rotor=Rotor(63.0, 90.0),
         sections={"tower_base": (6.0, 0.027)},

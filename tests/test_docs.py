@@ -62,3 +62,34 @@ def test_every_key_of_every_type_of_wind_stands_on_its_page():
         told = set(re.findall(r"`(\w+)`", table))
         missing = set(section.model_fields) - common - told
         assert not missing, f"docs/wind.md does not tell of {', '.join(sorted(missing))} of {kind} wind"
+
+
+def test_every_key_of_a_campaign_and_every_column_of_the_table_stand_on_their_page():
+    from fatigue_runner.campaign.spec import Campaign, Fatigue, IntegratorSection, Log
+    from fatigue_runner.channels import LOADS
+    from fatigue_runner.results.columns import CASE
+
+    told = set(re.findall(r"`([\w.]+)`", (DOCS / "campaign.md").read_text(encoding="utf-8")))
+    keys = {*Campaign.model_fields, *IntegratorSection.model_fields}
+    keys |= {f"fatigue.{key}" for key in Fatigue.model_fields} | {f"log.{key}" for key in Log.model_fields}
+    keys |= {column.name for column in CASE} | {channel.name for channel in LOADS}
+    assert not keys - told, f"docs/campaign.md does not tell of {', '.join(sorted(keys - told))}"
+
+
+def test_the_logs_that_help_texts_name_are_those_of_the_quickstart():
+    from fatigue_runner.campaign.spec import campaign_source, parse_campaign
+    from fatigue_runner.inputs.source import Place
+    from fatigue_runner.inputs.sweep import expand
+    from fatigue_runner.naming import integrator_id, joined
+    from fatigue_runner.rotor import Rotor
+    from fatigue_runner.wind.section import Site
+
+    source = campaign_source("quickstart")
+    campaign = parse_campaign(source)
+    winds = campaign.wind.realisations(Site(Rotor(63.0, 90.0), campaign.duration, Place(source, ("wind",))))
+    steps = [(item.method, step) for item in campaign.integrators for step, _ in expand(item.step)]
+    logs = {joined(wind.id, integrator_id(*step)) for wind in winds for step in steps}
+    for room in ("viewer", "logbook"):
+        text = (ROOT / "fatigue_runner" / room / "commands.py").read_text(encoding="utf-8")
+        named = re.findall(r"runs/quickstart/logs/(\S+)\.mcap", text)
+        assert named and set(named) <= logs

@@ -57,7 +57,7 @@ from pydantic import (
 
 from fatigue_runner import shipped
 from fatigue_runner.campaign.damage_section import DamageSection
-from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES
+from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES, channel_name
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, problem, validated
 from fatigue_runner.inputs.source import Source, read_mapping
@@ -160,6 +160,7 @@ class Fatigue(Section):
     @field_validator("channels")
     @classmethod
     def _channels_exist(cls, channels: list[str]) -> list[str]:
+        channels = [channel_name(name) for name in channels]
         for name in channels:
             if name not in LOAD_NAMES:
                 raise problem(f"{name!r} is no load channel{did_you_mean(name, LOAD_NAMES)}")
@@ -195,6 +196,7 @@ class Log(Section):
         from fatigue_runner.turbine.dynamics import signals_of_control
 
         known = dict.fromkeys((*BY_NAME, *signals_of_control()))
+        channels = None if channels is None else [channel_name(name) for name in channels]
         for name in channels or ():
             if name not in known:
                 raise problem(

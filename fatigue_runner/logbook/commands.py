@@ -40,7 +40,7 @@ def info(
 
     Examples:
 
-        fatigue-runner logs info runs/quickstart/logs/v08.00_kv0.10_heun_10ms.mcap
+        fatigue-runner logs info runs/quickstart/logs/v08.00_ntmB_s800001_rk4_50ms.mcap
     """
     console = Console()
     # A cut number would be a wrong one: rather let a narrow terminal wrap the lines.

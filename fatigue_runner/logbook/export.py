@@ -58,7 +58,7 @@ def choose(columns: Columns, patterns: Iterable[str] | None) -> Columns:
     patterns = list(columns) if patterns is None else list(patterns)
     chosen: Columns = {"time": columns["time"]}
     for pattern in patterns:
-        matching = [name for name in columns if fnmatchcase(name, pattern)]
+        matching = [name for name in columns if fnmatchcase(name, channels.channel_name(pattern))]
         if not matching:
             raise LogError(f"no channel {pattern!r} in the log{did_you_mean(pattern, columns)}")
         chosen |= {name: columns[name] for name in matching}

@@ -53,7 +53,7 @@ def view(
 
         fatigue-runner view runs/quickstart
 
-        fatigue-runner view runs/quickstart/logs/u8_heun_10ms.mcap --scale 3
+        fatigue-runner view runs/quickstart/logs/v08.00_ntmB_s800001_rk4_50ms.mcap --scale 3
 
         fatigue-runner view runs/quickstart --save turbine.rrd
     """

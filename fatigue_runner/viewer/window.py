@@ -24,7 +24,7 @@ HOST = "127.0.0.1"
 WEB_PORT = 9090
 _START_SECONDS = 20.0
 _WRITE_SECONDS = 300.0
-INSTALL = "pip install 'fatigue-runner[view]'"
+INSTALL = "pip install 'rerun-sdk>=0.41,<0.42'"
 
 
 def view(

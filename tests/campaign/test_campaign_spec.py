@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fatigue_runner.campaign.spec import Campaign, campaign_source, parse_campaign
+from fatigue_runner.channels import LOAD_NAMES, OPENFAST
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.sweep import Random, Range, expand
 
@@ -328,3 +329,16 @@ def test_no_text_ends_in_anything_but_a_campaign_or_an_input_error(tmp_path_fact
         parse_campaign(campaign_source(path))
     except InputError as error:
         assert str(error).startswith(str(path))
+
+
+def test_openfast_s_names_of_channels_are_understood(tmp_path):
+    text = (
+        MINIMAL
+        + "fatigue: {channels: [RootMyb1, TwrBsMyt, rootmxb2, rotor_thrust]}\nlog: {channels: [GenTq, rotor_speed]}\n"
+    )
+    campaign = parse(tmp_path, text)
+    assert campaign.fatigue.channels == [
+        "blade1_root_flapwise_moment", "tower_base_fore_aft_moment", "blade2_root_edgewise_moment", "rotor_thrust"
+    ]  # fmt: skip
+    assert campaign.log.channels == ["generator_torque", "rotor_speed"]
+    assert set(OPENFAST.values()) <= set(LOAD_NAMES)
