@@ -54,6 +54,8 @@ def _processor() -> str:
 def resolved_yaml(resolved: Resolved) -> str:
     """The campaign with every default written out, as YAML that can be run again from anywhere."""
     data = resolved.campaign.model_dump(exclude={"wind", "integrators", "reference"})
+    if resolved.campaign.operation != "fixed":
+        del data["pitch"]  # the turbine makes it itself; given beside that it is refused
     data["turbine"] = resolved.turbine_source
     data["wind"] = resolved.campaign.wind.resolved(Place(resolved.source, ("wind",)))
     files = {found.path: found.file for found in resolved.integrations}
