@@ -110,7 +110,12 @@ def _simulate(
         {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan.resolved).encode()},
         plan.resolved.walls,
     )
-    about_run = {"facts": facts, "campaign": plan.campaign.model_dump(), "wind": wind_words(plan.resolved)}
+    about_run = {
+        "cases": len(plan.cases),
+        "facts": facts,
+        "campaign": plan.campaign.model_dump(),
+        "wind": wind_words(plan.resolved),
+    }
     store.open(about_run, text)
     try:
         jobs = plan.jobs(store, setup, workers)

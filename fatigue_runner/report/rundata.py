@@ -99,6 +99,12 @@ class Run:
             return None
 
     no_life: str = ""  # why there is none
+    planned: int | None = None  # cases of the campaign, where the folder says so
+
+    @property
+    def missing(self) -> int:
+        """Cases of the campaign that the run has not come to."""
+        return max(0, (self.planned or 0) - len(self.rows))
 
     def setting(self, path: str, default: Any = None) -> Any:
         """A value of the resolved campaign by its dotted path; `default` where it is absent or null."""
@@ -121,13 +127,14 @@ class Run:
     def facts(self) -> list[tuple[str, str]]:
         """What was run, with what, when and where: (name, value) of the page's head."""
         facts = self._facts or self._facts_of_a_log()
-        finished = datetime.fromtimestamp((self.folder / "results.csv").stat().st_mtime, tz=UTC)
+        table = self.folder / "results.csv"
+        finished = datetime.fromtimestamp(table.stat().st_mtime, tz=UTC) if table.is_file() else None
         shown = {
             "Campaign": self.name,
             "Turbine": str(facts.get("turbine") or self.setting("turbine", "")),
             "Turbine hash": str(facts.get("turbine_hash", ""))[:16],
             "Cases": f"{len(self.winds)} winds × {len(self.summaries)} integrators = {len(self.rows)}",
-            "Finished": finished.strftime("%Y-%m-%d %H:%M UTC"),
+            "Finished": "not yet" if finished is None else finished.strftime("%Y-%m-%d %H:%M UTC"),
             "Machine": str(facts.get("machine", "")),
             "Versions": str(facts.get("versions", "")),
         }
@@ -160,7 +167,17 @@ def load_run(folder: Path) -> Run:
     settings.
     """
     rows = read_results(folder)
-    return Run(folder, rows, *_read_settings(folder))
+    run = Run(folder, rows, *_read_settings(folder))
+    run.planned = _planned(folder)
+    return run
+
+
+def _planned(folder: Path) -> int | None:
+    try:
+        found = json.loads((folder / "run.json").read_text(encoding="utf-8")).get("cases")
+    except (OSError, ValueError, AttributeError):
+        return None
+    return found if isinstance(found, int) else None
 
 
 def _read_settings(folder: Path) -> tuple[Mapping[str, Any], Mapping[str, str], Mapping[str, list[str]]]:

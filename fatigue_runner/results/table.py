@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 import re
 from collections.abc import Iterator
@@ -114,12 +115,32 @@ def _with_point(cell: Any) -> Any:
     )
 
 
-def read_results(folder: Path) -> list[dict[str, str]]:
-    """The rows of a run folder's `results.csv`, every cell as text (`cells` has their values).
+def _finished_cases(journal: Path) -> list[dict[str, Any]]:
+    """The last row of every case of a journal; a line that a crash cut off is as if it were never written."""
+    found: dict[str, dict[str, Any]] = {}
+    for line in journal.read_bytes().split(b"\n"):
+        try:
+            row = json.loads(line)["row"]
+            found[row["case_id"]] = row
+        except (ValueError, KeyError, TypeError):
+            continue
+    return list(found.values())
+
+
+def read_results(folder: Path) -> list[dict[str, Any]]:
+    """The rows of a run folder's `results.csv`, every cell as text (`cells` has their values); of a run that has not ended those of
+    the cases that it has finished.
 
     Raises InputError, one sentence, for a folder without results and an empty or foreign table.
     """
     table = folder / "results.csv"
+    if not table.is_file() and (folder / "cases.jsonl").is_file():
+        found = _finished_cases(folder / "cases.jsonl")
+        if not found:
+            raise InputError(
+                f"{folder}: the run has not finished a case yet; `fatigue-runner run` goes on with it"
+            )
+        return found
     if not table.is_file():
         raise InputError(f"{folder} holds no results.csv; give the output folder of `fatigue-runner run`")
     try:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
+import pytest
 from report_example import CAMPAIGN, example_rows, write_run
 
+from fatigue_runner.errors import InputError
 from fatigue_runner.report.blocks import Figure, Table, Warnings
+from fatigue_runner.report.page import render
 from fatigue_runner.report.rundata import load_run
 from fatigue_runner.report.sections import definitions, life, life_spectra
 
@@ -60,3 +65,18 @@ def test_a_life_that_cannot_be_told_says_why_and_one_not_asked_for_is_not_there(
     section = life.build(run_with(tmp_path, lifetime={"climate": "II", "bins": {"edges": [4, 11, 12]}}))
     assert "bin from 11 to 12 m/s has no wind" in section.blocks[0].text
     assert life.build(load_run(write_run(tmp_path / "none", example_rows()))) is None
+
+
+def test_a_run_that_has_not_ended_says_so_and_shows_what_there_is(tmp_path):
+    rows = example_rows(diverging=False)
+    write_run(tmp_path, rows, CAMPAIGN)
+    (tmp_path / "results.csv").unlink()
+    lines = [json.dumps({"row": {k: None if v == "" else v for k, v in row.items()}}) for row in rows[:25]]
+    (tmp_path / "cases.jsonl").write_text("\n".join([*lines, '{"row": {"case_id": "cut of']))
+    (tmp_path / "run.json").write_text(json.dumps({"campaign": CAMPAIGN, "cases": len(rows)}))
+    run = load_run(tmp_path)
+    page = render(run)
+    assert f"The run is not finished: 25 of {len(rows)} cases are there" in page and "not yet" in page
+    (tmp_path / "cases.jsonl").write_text("")
+    with pytest.raises(InputError, match="has not finished a case yet"):
+        load_run(tmp_path)

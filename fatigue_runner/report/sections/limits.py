@@ -20,6 +20,7 @@ SHORT = 600.0  # s; the length of a load case in IEC 61400-1
 def build(run: Run) -> Section | None:
     """The warnings of this run; None where there are none."""
     items = [
+        *_unfinished(run),
         *_operation(run),
         *pitch_rate_sentences(run.rows),
         *_lost(run),
@@ -28,6 +29,15 @@ def build(run: Run) -> Section | None:
     ]
     items += [*_unresolved(run), *_short(run), *_folder(run)]
     return Section("What limits this result", [Warnings(items)]) if items else None
+
+
+def _unfinished(run: Run) -> list[str]:
+    if not run.missing:
+        return []
+    return [
+        f"The run is not finished: {len(run.rows)} of {run.planned} cases are there, and the page shows what they say. The command that "
+        "began it goes on with the rest."
+    ]
 
 
 def lost_share(rows: list[Row]) -> float:
