@@ -11,14 +11,16 @@ import sys
 from typing import TYPE_CHECKING
 
 import typer
+from typer.core import TyperGroup
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
-def command_group(help: str | None = None) -> typer.Typer:
-    """An app for several commands with a help text, or for one command, which is then mounted itself."""
+def command_group(help: str | None = None, cls: type[TyperGroup] = TyperGroup) -> typer.Typer:
+    """An app for several commands with a help text, or for one command, which is then mounted itself; cls: of the group."""
     return typer.Typer(
+        cls=cls,
         no_args_is_help=help is not None,
         rich_markup_mode="markdown",
         pretty_exceptions_enable=False,

@@ -17,13 +17,14 @@ from fatigue_runner.turbine import load_turbine
 from fatigue_runner.turbine.beam import blade_modes, tower_modes
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.loop import check_loop, speed_mode
-from fatigue_runner.turbine.turbine import CONTROLLED
+from fatigue_runner.turbine.turbine import CONTROLLED, FIXED
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
     from fatigue_runner.turbine import Turbine
+    from fatigue_runner.turbine.deck.importing import Imported
 
 
 def print_turbine(
@@ -97,6 +98,84 @@ _SHORT = {
 _GAINS = ("proportional_gain", "integral_gain", "gain_schedule_pitch_deg")
 
 
+CURVE = (4.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0)  # m/s
+
+
+def print_imported(made: Imported, console: Console) -> None:
+    """A turbine that was imported from a deck: its masses, modes and operating curve, what was decided, what "
+    "is left out, what comes next."""
+    from rich.markup import escape
+
+    name = str(made.turbine)
+    turbine = load_turbine(name)
+    console.print(f"[bold]{escape(turbine.name)}[/]  {escape(turbine.description)}", soft_wrap=True)
+    console.print(_masses(name, turbine))
+    curve = _curve(turbine)
+    console.print(curve)
+    winds = [wind for wind in (6.0, 8.0, 10.0) if _steady(turbine, wind)]
+    if winds:
+        console.print(_frequencies(turbine, winds, 0.0))
+    if made.notes:
+        console.print("[bold]Decided on the way[/]")
+        for note in made.notes:
+            console.print(f"- {escape(note)}", soft_wrap=True)
+        console.print()
+    table = _plain_table("The deck has, the model leaves out", "what", "what that means for fatigue")
+    table.columns[1].justify = "left"
+    for omission in made.omissions:
+        table.add_row(escape(omission.what), escape(omission.means))
+    console.print(table)
+    for path in (made.turbine, made.airfoils, made.tables):
+        console.print(f"wrote {escape(str(path))}", soft_wrap=True)
+    console.print(
+        f"next: `turbine: {escape(name)}` in a campaign; `fatigue-runner train --turbine {escape(name)}` for its correctors",
+        soft_wrap=True,
+    )
+
+
+def _steady(turbine: Turbine, wind: float) -> bool:
+    try:
+        turbine.operating_point(wind)
+    except InputError:
+        return False
+    return True
+
+
+def _curve(turbine: Turbine) -> Table:
+    """Steady operation over the wind, under the controller where there is one."""
+    mode = CONTROLLED if turbine.control is not None else FIXED
+    operated = turbine.operated(mode)
+    names = (
+        "rotor_speed",
+        "generator_torque",
+        "rotor_thrust",
+        "blade1_root_flapwise_moment",
+        "tower_base_fore_aft_moment",
+    )
+    headings = [f"{BY_NAME[name].label}, {BY_NAME[name].read_unit}" for name in names]
+    table = _plain_table("Operating curve", "wind, m/s", "pitch, deg", "generator power, kW", *headings)
+    for wind in CURVE:
+        try:
+            values = _means_over_a_revolution(operated, wind, 0.0)
+        except InputError:
+            table.add_row(f"{wind:g}", *["-"] * (2 + len(names)))
+            continue
+        power = values["generator_torque"] * values["generator_speed"] / 1e3
+        pitch = np.degrees(values.get("pitch", 0.0))
+        table.add_row(
+            f"{wind:g}",
+            f"{pitch:.2f}",
+            f"{power:,.0f}",
+            *(f"{values[name] * BY_NAME[name].scale:,.4g}" for name in names),
+        )
+    table.caption = (
+        "under its controller"
+        if mode == CONTROLLED
+        else "at zero pitch, there is no controller; -: no steady rotation"
+    )
+    return table
+
+
 def _plain_table(title: str, *headings: str) -> Table:
     from rich import box
     from rich.table import Table
@@ -141,6 +220,15 @@ def _operating_points(turbine: Turbine, winds: Sequence[float], pitch: float) ->
         table.add_row(f"{wind:g}", *(_figure(values[name] * BY_NAME[name].scale) for name in names))
     table.caption = "means over a revolution, without shear"
     return table
+
+
+def _means_over_a_revolution(turbine: Turbine, wind: float, pitch: float) -> dict[str, float]:
+    azimuths = np.arange(24) * 2 * np.pi / 24
+    states = np.array([turbine.operating_point(wind, azimuth=azimuth, pitch=pitch) for azimuth in azimuths])
+    signals = np.tile([wind, 0.0, 0.0], (len(azimuths), 1))
+    series = dict(zip(turbine.layout.names, states.T, strict=True)) | turbine.loads(states, signals, pitch)
+    series |= {"pitch": turbine.commanded(states).get("pitch", np.full(len(azimuths), pitch))}
+    return {name: float(np.mean(values)) for name, values in series.items()}
 
 
 def _frequencies(turbine: Turbine, winds: Sequence[float], pitch: float) -> Table:

@@ -44,7 +44,8 @@ class BladeAerodynamics:
     radius, chord (n,) [m], twist (n,) [rad]; cone [rad]; lift, drag: per station, the coefficient as function
     of the angle of attack [rad]; shapes (n, 4): phi_x, phi_y, psi_x, psi_y at the stations, at zero pitch;
     weights (6, n): the integral over the blade of 1, r, phi_x, phi_y, psi_x, psi_y times a load that is 1 at
-    one station, 0 at the others and linear in between.
+    one station, 0 at the others and linear in between. prebend, sweep (n,): where the section is off the pitch axis, along e1
+    and e2 [m]; cant (n,): by how much it leans beyond the cone [rad]; bent: whether a turbine file gives them.
     """
 
     blades: int
@@ -58,6 +59,15 @@ class BladeAerodynamics:
     drag: tuple[Polar, ...]
     shapes: Array
     weights: Array
+    prebend: Array
+    sweep: Array
+    cant: Array
+    bent: bool
+
+    @property
+    def arm(self) -> Array:
+        """(n,) distance of the sections from the shaft by cos(cone) [m]: r where the blade is straight."""
+        return self.radius - self.prebend * np.tan(self.cone)
 
     @property
     def rotor_radius(self) -> float:
@@ -91,6 +101,18 @@ def blade_aerodynamics(
     hats = np.stack([np.interp(grid, radius, unit) for unit in np.eye(len(radius))[1:-1]])
     inner = slice(1, -1)
     lift, drag = zip(*(polars[name] for name in stations["airfoil"][inner]), strict=True)
+    straight = np.zeros_like(span)
+    prebend, sweep = stations.get("prebend", straight), stations.get("sweep", straight)
+    cant = (
+        np.radians(stations["cant_deg"]) if "cant_deg" in stations else np.arctan(np.gradient(prebend, span))
+    )
+    deflection = aerodynamics.get("deflection", 0.0)
+    if deflection:
+        slope = np.interp(radius, grid, modes.flap_slope[:, 0])
+        prebend, cant = (
+            prebend + deflection * modes.flap_at(radius)[:, 0],
+            cant + np.arctan(deflection * slope),
+        )
     return BladeAerodynamics(
         blades=int(geometry["blades"]),
         hub_radius=modes.hub_radius,
@@ -102,7 +124,12 @@ def blade_aerodynamics(
         lift=lift,
         drag=drag,
         shapes=np.concatenate([modes.flap_at(radius[inner]), modes.edge_at(radius[inner])], axis=1),
-        weights=(hats * steps @ carried).T,
+        # along the bent blade, not along its axis
+        weights=(hats * steps @ carried).T * np.hypot(1.0, np.gradient(prebend, span))[inner],
+        prebend=prebend[inner],
+        sweep=sweep[inner],
+        cant=cant[inner],
+        bent=bool(deflection) or any(name in stations for name in ("prebend", "cant_deg")),
     )
 
 
@@ -126,15 +153,21 @@ def rotor_loads(
     arguments = [np.asarray(v, dtype=float) for v in (tip_speed_ratio, pitch, kappa, y, flap, edge, skew)]
     shape = np.broadcast_shapes(*(v.shape for v in arguments))
     arguments = [np.broadcast_to(v, shape).reshape(-1, 1) for v in arguments]
-    along_1, driving = strip_loads(blade, *arguments)
-    n, t = (along_1 @ blade.weights.T).T, (driving @ blade.weights.T).T
+    normal, driving = strip_loads(blade, *arguments)
+    # A canted section presses along the blade, too: the force that turns and pushes the rotor as the whole of it does.
+    cant, lean, whole = np.cos(blade.cant), np.sin(blade.cant), blade.cone + blade.cant
+    pushing = (normal * (np.cos(whole) / np.cos(blade.cone))) @ blade.weights[0] if blade.bent else None
+    n, t = ((normal * cant) @ blade.weights.T).T, (driving @ blade.weights.T).T
+    turning = driving * (blade.prebend * np.tan(blade.cone)) + normal * blade.sweep * np.sin(whole) / np.cos(
+        blade.cone
+    )
     theta = arguments[1][:, 0]
     c, s = np.cos(theta), np.sin(theta)
     loads = [
-        n[0],
+        n[0] if pushing is None else pushing,
         t[0],
-        t[1] / blade.rotor_radius,
-        n[1] / blade.rotor_radius,
+        (t[1] - turning @ blade.weights[0]) / blade.rotor_radius,
+        (n[1] + (normal * lean * blade.prebend) @ blade.weights[0]) / blade.rotor_radius,
         *((c * n[i] + s * n[i + 1]) - (c * t[i + 1] - s * t[i]) for i in (2, 4)),
     ]
     return np.stack(loads).reshape(len(LOAD_NAMES), *shape)
@@ -150,17 +183,21 @@ def strip_loads(
     edge: Array,
     skew: Array,
 ) -> tuple[Array, Array]:
-    """Loads per length of blade at the stations, (m, n): along e1, and in the rotor plane along the motion.
+    """Loads per length of blade at the stations, (m, n): normal to the section, and in the rotor plane along the motion.
 
     Arguments of `rotor_loads` as columns (m, 1); lam is the tip-speed ratio, theta the pitch. In units of
     (1/3) rho/2 A V^2 per metre.
     """
-    r, big_r, cos_cone = blade.radius, blade.rotor_radius, np.cos(blade.cone)
+    r, big_r, cos_cone = blade.arm, blade.rotor_radius, np.cos(blade.cone)
     c, s = np.cos(theta), np.sin(theta)
     flap_x, flap_y, edge_x, edge_y = blade.shapes.T
     speed_x = flap * flap_x + edge * edge_x  # structural velocity in the axes that turn with pitch
     speed_y = flap * flap_y + edge * edge_y
-    normal = (1.0 + kappa * r / big_r) * cos_cone - (c * speed_x + s * speed_y)
+    normal = (1.0 + kappa * r / big_r) * np.cos(blade.cone + blade.cant) - (
+        c * speed_x + s * speed_y
+    ) * np.cos(blade.cant)
+    if blade.bent:  # the wind along the blade presses on it where it leans; on a straight coned blade that is 0.4 % of the wind
+        normal = normal - skew * np.sin(blade.cone + blade.cant)
     in_plane = lam * r / big_r * cos_cone + y - (c * speed_y - s * speed_x)
     angle = inflow_angle(blade, normal, in_plane, theta)
     lift = _coefficient(blade.lift, angle - blade.twist - theta)
@@ -243,7 +280,7 @@ def _balance(blade: BladeAerodynamics, lift: Array, angle: Array) -> tuple[Array
     it 4 F k (1-a)^2 = 8/9 + (4F - 40/9) a + (50/9 - 4F) a^2 (Buhl), which is quadratic in sin(phi)/(1-a).
     """
     s, c = np.sin(angle), np.cos(angle)
-    solidity = blade.blades * blade.chord / (2 * np.pi * blade.radius * np.cos(blade.cone))
+    solidity = blade.blades * blade.chord / (2 * np.pi * blade.arm * np.cos(blade.cone))
     loss = _loss(blade, s)
     swirl = solidity * lift / (4 * loss)
     loading = swirl * c
@@ -293,8 +330,15 @@ def _coefficient(polars: tuple[Polar, ...], attack: Array) -> Array:
 
 def _find_root(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
     """Elementwise root between low and high, where the function changes sign."""
-    a, b = high, low
+    a, b = high, low.copy()
     fa, fb = function(a), function(b)
+    # Deep in reversed flow a stalled polar may change the sign once more: the bracket begins nearer to the axial flow then.
+    for nearer in (-1.0, -0.5, -0.2, -0.05):
+        lost = np.sign(fa) * np.sign(fb) > 0
+        if not lost.any():
+            break
+        b[lost] = nearer
+        fb = np.where(lost, function(b), fb)
     if np.any(np.sign(fa) * np.sign(fb) > 0):
         raise InputError(
             "blade-element momentum: no equilibrium between reversed and axial flow for this blade"

@@ -139,6 +139,8 @@ def blade_modes(parameters: Mapping[str, Any]) -> BladeModes:
     nodes, masses = _lumped(
         blade["mass_element_lengths"], length, stations, "span_fraction", blade["mass_factor"]
     )
+    if blade.get("tip_mass"):
+        nodes, masses = np.append(nodes, length), np.append(masses, float(blade["tip_mass"]))
     a = np.column_stack(
         [
             np.ones_like(nodes),

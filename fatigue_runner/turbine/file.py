@@ -21,6 +21,8 @@ from fatigue_runner.inputs.section import Section, known_name, problem, validate
 from fatigue_runner.inputs.source import Source, read_mapping
 from fatigue_runner.layout import FAMILIES
 from fatigue_runner.turbine import beam
+from fatigue_runner.turbine.consistency import check_consistency
+from fatigue_runner.turbine.finite_elements import with_modes
 from fatigue_runner.turbine.tables import INTERPOLATIONS
 
 Positive = Annotated[float, Field(gt=0)]
@@ -69,26 +71,20 @@ class Geometry(Section):
 
 
 class Hub(Section):
-    """A point mass at the rotor apex that turns."""
+    """A point mass on the shaft that turns; centre_of_mass: downwind of the rotor apex."""
 
     mass: Positive
     inertia: Positive
     centre_of_mass: float = 0.0
 
-    @field_validator("centre_of_mass")
-    @classmethod
-    def _at_the_apex(cls, distance: float) -> float:
-        if distance:
-            raise problem(f"must be 0: the model has the hub's mass at the rotor apex; got {distance:g}")
-        return distance
-
 
 class Nacelle(Section):
-    """A rigid body on the tower; its centre of mass: downwind, lateral, up, from the tower top."""
+    """A rigid body on the tower; its centre of mass: downwind, lateral, up, from the tower top, where the yaw bearing's mass is."""
 
     mass: Positive
     yaw_inertia: Positive
     centre_of_mass: list[float] = Field(min_length=3, max_length=3)
+    yaw_bearing_mass: NotNegative = 0.0
 
     @model_validator(mode="after")
     def _a_body(self) -> Nacelle:
@@ -103,8 +99,9 @@ class Nacelle(Section):
 
 
 class Drivetrain(Section):
-    """Shaft, gearbox and generator rotor."""
+    """Shaft, gearbox and generator rotor. shaft: rigid has the generator turn with the rotor (docs/turbines.md)."""
 
+    shaft: Literal["flexible", "rigid"] = "flexible"
     gearbox_ratio: Positive
     gearbox_efficiency: Efficiency = 1.0
     torsional_stiffness: Positive
@@ -113,12 +110,21 @@ class Drivetrain(Section):
 
 
 class Regions(Section):
-    """The torque law of `law: regions`."""
+    """The torque law of `law: regions`; region 3 has constant power or constant torque."""
 
     region_3_speed_rpm: Positive
     slip_percent: Positive
-    rated_mechanical_power: Positive
+    rated_mechanical_power: Positive | None = None
+    rated_torque: Positive | None = None
     blend_torque: NotNegative
+
+    @model_validator(mode="after")
+    def _power_or_torque(self) -> Regions:
+        if (self.rated_mechanical_power is None) == (self.rated_torque is None):
+            raise problem(
+                "needs rated_mechanical_power (constant power above rated) or rated_torque (constant torque), one of the two"
+            )
+        return self
 
 
 class Generator(Section):
@@ -144,7 +150,7 @@ class Stations(Section):
 
 
 class Member(Section):
-    """Blade or tower: a beam with stations and prescribed modes."""
+    """Blade or tower: a beam with stations and modes, which follow from mass and stiffness where none are given."""
 
     fraction: ClassVar[str]  # the column that says where a station is
     numbers: ClassVar[tuple[str, ...]]  # the other columns
@@ -158,8 +164,10 @@ class Member(Section):
         with _about("stations"):
             beam.stations_of({"stations": self.stations.model_dump()}, self.fraction, "")
         for name in self.modes:
-            with _about(f"{name}_mode"):
-                beam.mode_shape(getattr(self, f"{name}_mode"), "")
+            coefficients = getattr(self, f"{name}_mode")
+            if coefficients is not None:
+                with _about(f"{name}_mode"):
+                    beam.mode_shape(coefficients, "")
         return self
 
 
@@ -184,9 +192,10 @@ class Blade(Member):
     edge_stiffness_factor: Positive
     flap_damping_ratio: Ratio
     edge_damping_ratio: Ratio
-    flap_mode: list[float] = Field(min_length=1)
-    edge_mode: list[float] = Field(min_length=1)
+    flap_mode: list[float] | None = Field(default=None, min_length=1)
+    edge_mode: list[float] | None = Field(default=None, min_length=1)
     mass_element_lengths: list[Positive] = Field(min_length=1)
+    tip_mass: NotNegative = 0.0
 
 
 class Tower(Member):
@@ -201,8 +210,8 @@ class Tower(Member):
     side_side_stiffness_factor: Positive
     fore_aft_damping_ratio: Ratio
     side_side_damping_ratio: Ratio
-    fore_aft_mode: list[float] = Field(min_length=1)
-    side_side_mode: list[float] = Field(min_length=1)
+    fore_aft_mode: list[float] | None = Field(default=None, min_length=1)
+    side_side_mode: list[float] | None = Field(default=None, min_length=1)
     mass_elements: int = Field(ge=1)
     diameters: list[list[float]] | None = Field(default=None, min_length=2)
 
@@ -226,6 +235,7 @@ class Aerodynamics(Section):
     airfoils: str | None = None
     skewed_wake: bool = True
     polar_smoothing_deg: NotNegative | None = None
+    deflection: float = 0.0
     stations: Stations | None = None
 
     @field_validator("interpolation")
@@ -237,7 +247,9 @@ class Aerodynamics(Section):
     @classmethod
     def _columns(cls, stations: Stations | None) -> Stations | None:
         if stations is not None:
-            _check_table(stations, ("span", "chord", "twist_deg"), ("airfoil",))
+            _check_table(
+                stations, ("span", "chord", "twist_deg"), ("airfoil",), ("prebend", "sweep", "cant_deg")
+            )
         return stations
 
     @model_validator(mode="after")
@@ -268,6 +280,22 @@ class Sections(Section):
     blade_root: CircleSection | None = None
 
 
+class Published(Section):
+    """What is known of the turbine from elsewhere, to check the file against; refused where it is off by more than `tolerance`."""
+
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = 0.02
+    blade_mass: Positive | None = None
+    rotor_inertia: Positive | None = None
+    tower_mass: Positive | None = None
+
+
+class DeckOrigin(Section):
+    """The OpenFAST deck that a file was imported from: its `.fst` and the SHA-256 of every file that was read."""
+
+    file: str
+    sha256: dict[str, str]
+
+
 class TurbineFile(Section):
     """A whole turbine file, its base merged in."""
 
@@ -275,6 +303,8 @@ class TurbineFile(Section):
     model: str = "t2b1i1cg"
     description: str = ""
     source: str = ""
+    deck: DeckOrigin | None = None
+    published: Published | None = None
     environment: Environment
     geometry: Geometry
     hub: Hub
@@ -302,20 +332,44 @@ class TurbineFile(Section):
 
 
 class AirfoilFile(Section):
-    """The polars: rows of angle of attack [deg], lift and drag coefficient, by the airfoil's name."""
+    """The polars: rows of angle of attack [deg], lift and drag coefficient, by the airfoil's name; or the same as a block of text."""
 
     columns: list[str] = Field(default=["angle_of_attack_deg", "lift", "drag"])
     airfoils: dict[str, list[list[float]]]
 
+    @field_validator("airfoils", mode="before")
+    @classmethod
+    def _rows(cls, airfoils: Any) -> Any:
+        if not isinstance(airfoils, dict):
+            return airfoils
+        return {
+            name: _block(name, rows) if isinstance(rows, str) else rows for name, rows in airfoils.items()
+        }
 
-def _check_table(table: Stations, numbers: tuple[str, ...], words: tuple[str, ...]) -> None:
+
+def _block(name: str, text: str) -> list[list[float]]:
+    rows = []
+    for count, line in enumerate(text.splitlines(), start=1):
+        try:
+            row = [float(word) for word in line.replace(",", " ").split()]
+        except ValueError:
+            raise problem(f"row {count} must be three numbers; got {line.strip()!r:.60}", key=name) from None
+        if row:
+            rows.append(row)
+    return rows
+
+
+def _check_table(
+    table: Stations, numbers: tuple[str, ...], words: tuple[str, ...], optional: tuple[str, ...] = ()
+) -> None:
     """Raise where a table has other columns, or a row that does not fit them."""
-    known = (*numbers, *words)
+    needed = (*numbers, *words)
+    known = (*needed, *optional)
     for name in table.columns:
         if name not in known:
             raise problem(f"unknown column {name!r}{did_you_mean(name, known)}", key="stations")
     for name in known:
-        if table.columns.count(name) != 1:
+        if table.columns.count(name) != 1 and (name in needed or name in table.columns):
             what = "is missing" if name not in table.columns else "is given twice"
             raise problem(f"column {name!r} {what}; it has {', '.join(table.columns)}", key="stations")
     for number, row in enumerate(table.rows, start=1):
@@ -340,11 +394,14 @@ def read_turbine_file(name: str) -> dict[str, Any]:
 def check_turbine(source: Source) -> dict[str, Any]:
     """The data of a source that holds a whole turbine, or a full set of parameters, which has checks of its own.
 
-    Raises InputError as `read_turbine_file`.
+    Modes that are not given are those of mass and stiffness. Raises InputError as `read_turbine_file`.
     """
-    if "parameters" not in source.data:
-        validated(TurbineFile, source)
-    return dict(source.data)
+    if "parameters" in source.data:
+        return dict(source.data)
+    validated(TurbineFile, source)
+    data = with_modes(source.data)
+    check_consistency(data, source)
+    return data
 
 
 def mapping_source(mapping: Mapping[str, Any]) -> Source:

@@ -8,7 +8,7 @@ tension, and a rigid body on the free end. Source: K.-J. Bathe, "Finite Element 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,13 @@ def clamped_frequencies(beam: Beam, count: int = 4, elements: int = 100) -> tupl
 
     Returns frequencies (count,) [Hz] and end displacements (count, 2) in planes x and y, of unit length.
     """
+    frequencies, vectors = _clamped_modes(beam, count, elements)
+    ends = vectors[[-4, -2], :].T
+    return frequencies, ends / np.linalg.norm(ends, axis=1, keepdims=True)
+
+
+def _clamped_modes(beam: Beam, count: int, elements: int) -> tuple[Array, Array]:
+    """Frequencies (count,) [Hz] and shapes (4 (elements + 1), count): u, u', v, v' at every node."""
     from scipy.linalg import eigh
 
     nodes = np.linspace(beam.position[0], beam.position[-1], elements + 1)
@@ -62,8 +69,8 @@ def clamped_frequencies(beam: Beam, count: int = 4, elements: int = 100) -> tupl
         # The weight or pull at the end acts at the body's centre: it follows the slope over the height h.
         stiff[tip[1], tip[1]] += beam.tension[-1] * h
     squares, vectors = eigh(stiff[4:, 4:], mass[4:, 4:], subset_by_index=[0, count - 1])
-    ends = vectors[[-4, -2], :].T
-    return np.sqrt(squares) / (2 * np.pi), ends / np.linalg.norm(ends, axis=1, keepdims=True)
+    clamped = np.zeros((4, count))
+    return np.sqrt(squares) / (2 * np.pi), np.concatenate([clamped, vectors])
 
 
 def _element(beam: Beam, start: float, end: float) -> tuple[Array, Array]:
@@ -161,3 +168,50 @@ def _beyond(density: Array, position: Array) -> Array:
     """Integral of a station-wise linear density from each station to the free end."""
     pieces = np.diff(position) * (density[1:] + density[:-1]) / 2
     return np.concatenate([np.cumsum(pieces[::-1])[::-1], [0.0]])
+
+
+POWERS = np.arange(2, 7)  # of the span fraction in a mode's polynomial, as in ElastoDyn's files
+
+
+def first_mode(beam: Beam, plane: int) -> tuple[float, list[float]]:
+    """Frequency [Hz] and polynomial (coefficients of x^2 .. x^6 that add up to 1) of the first bending mode in a plane, 0 or 1.
+
+    The beam is taken as untwisted, for that is what the polynomial bends about.
+    """
+    straight = replace(beam, twist=np.zeros_like(beam.twist))
+    frequencies, vectors = _clamped_modes(straight, 8, 100)
+    shapes = vectors.reshape(101, 2, 2, -1)  # node, plane, value and slope
+    share = np.abs(shapes[-1, plane, 0]) / np.linalg.norm(shapes[-1, :, 0], axis=0)
+    chosen = int(np.argmax(share > 0.99))
+    length = beam.position[-1] - beam.position[0]
+    value, slope = shapes[:, plane, 0, chosen], shapes[:, plane, 1, chosen] * length
+    x = np.linspace(0.0, 1.0, 101)[:, None]
+    # the slope with it: a mode's stiffness comes from its curvature
+    rows = np.concatenate([x**POWERS, 0.3 * POWERS * x ** (POWERS - 1)])
+    right = np.concatenate([value, 0.3 * slope]) / value[-1]
+    coefficients = np.linalg.lstsq(rows, right, rcond=None)[0]
+    coefficients /= coefficients.sum()
+    return float(frequencies[chosen]), [round(float(c), 6) for c in coefficients]
+
+
+def rotor_nacelle_mass(parameters: Mapping[str, Any]) -> float:
+    """What stands on the tower [kg]."""
+    hub, nacelle, blade = (parameters[key] for key in ("hub", "nacelle", "blade"))
+    table = columns(blade["stations"])
+    length = parameters["geometry"]["tip_radius"] - parameters["geometry"]["hub_radius"]
+    one = blade["mass_factor"] * np.trapezoid(table["mass_density"], table["span_fraction"]) * length
+    one += blade.get("tip_mass", 0.0)
+    return float(hub["mass"] + nacelle["mass"] + nacelle.get("yaw_bearing_mass", 0.0) + 3 * one)
+
+
+def with_modes(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A turbine file's mapping with the modes that it does not give: of the clamped beam, the tower with the mass on its top."""
+    out = dict(data)
+    for member, names in (("blade", ("flap", "edge")), ("tower", ("fore_aft", "side_side"))):
+        missing = [name for name in names if data[member].get(f"{name}_mode") is None]
+        if not missing:
+            continue
+        beam = blade_beam(data) if member == "blade" else tower_beam(data, rotor_nacelle_mass(data))
+        modes = {f"{name}_mode": first_mode(beam, names.index(name))[1] for name in missing}
+        out[member] = {**data[member], **modes}
+    return out

@@ -27,6 +27,10 @@ _INTEGRALS = {
     "b_rsff": ("r", "S_ff"), "b_rsfe": ("r", "S_fe"), "b_rsee": ("r", "S_ee"),
 }  # fmt: skip
 
+# what a parameter is in a set that was written before it was there; as such it is not in the hash
+DEFAULTS = {"g_efficiency": 1.0, "g_rigid": 0.0}
+
+TETHER = 2.0  # rad/s: over-damped, much slower than any step, much faster than rounding errors grow
 _FAR = 1e9  # a torque that is never reached [N m]
 
 
@@ -38,8 +42,8 @@ def equation_parameters(data: Mapping[str, Any]) -> dict[str, float]:
     try:
         blade, tower = blade_modes(data), tower_modes(data)
         cone, tilt = radians(data["geometry"]["precone_deg"]), radians(data["geometry"]["shaft_tilt_deg"])
-        hub, nacelle, drive, env = data["hub"], data["nacelle"], data["drivetrain"], data["environment"]
-        x, y, z = nacelle["centre_of_mass"]
+        hub, drive, env = data["hub"], data["drivetrain"], data["environment"]
+        body = _nacelle(data)
         radius = data["geometry"]["tip_radius"] * cos(cone)
         values = {
             **_blade(blade),
@@ -49,11 +53,8 @@ def equation_parameters(data: Mapping[str, Any]) -> dict[str, float]:
             "cos_cone": cos(cone), "sin_cone": sin(cone), "cos_tilt": cos(tilt), "sin_tilt": sin(tilt),
             "h_m": hub["mass"], "h_ixx": hub["inertia"], "h_itt": 0.0,
             "overhang": data["geometry"]["overhang"], "tower_to_shaft": data["geometry"]["tower_top_to_shaft"],
-            "n_m": nacelle["mass"], "n_x": x, "n_y": y, "n_z": z, "n_ixx": 0.0, "n_iyy": 0.0,
-            # the report gives the inertia about the yaw axis
-            "n_izz": nacelle["yaw_inertia"] - nacelle["mass"] * (x * x + y * y),
-            "g_i": drive["generator_inertia"], "g_ratio": drive["gearbox_ratio"],
-            "d_k": drive["torsional_stiffness"], "d_d": drive["torsional_damping"],
+            **body,
+            **_drivetrain(drive),
             "gravity": env["gravity"], "radius": radius,
             "q_area": env["air_density"] * np.pi * radius**2 / 2,
         }  # fmt: skip
@@ -68,6 +69,7 @@ def checked(values: Mapping[str, float]) -> dict[str, float]:
     """The parameters, complete and finite; raises InputError for a missing, unknown or non-finite one."""
     from fatigue_runner.turbine.generated.kernel import PARAMETERS
 
+    values = {**DEFAULTS, **values}
     for name in values:
         if name not in PARAMETERS:
             raise InputError(f"turbine parameters: unknown name {name!r}{did_you_mean(name, PARAMETERS)}")
@@ -89,6 +91,54 @@ def _blade(blade: BladeModes) -> dict[str, float]:
         "b_tip_fx": blade.flap_tip[0], "b_tip_fy": blade.flap_tip[1],
         "b_tip_ex": blade.edge_tip[0], "b_tip_ey": blade.edge_tip[1],
     }  # fmt: skip
+
+
+def _drivetrain(drive: Mapping[str, Any]) -> dict[str, float]:
+    """Of a rigid shaft, stiffness and damping only keep the generator's angle from drifting off the rotor's by rounding."""
+    inertia, ratio = drive["generator_inertia"], drive["gearbox_ratio"]
+    rigid = drive.get("shaft", "flexible") == "rigid"
+    low_speed = inertia * ratio**2
+    return {
+        "g_i": inertia, "g_ratio": ratio, "g_efficiency": drive.get("gearbox_efficiency", 1.0), "g_rigid": float(rigid),
+        "d_k": low_speed * TETHER**2 if rigid else drive["torsional_stiffness"],
+        "d_d": 4 * low_speed * TETHER if rigid else drive["torsional_damping"],
+    }  # fmt: skip
+
+
+def _nacelle(data: Mapping[str, Any]) -> dict[str, float]:
+    """The nacelle as the rigid body of the equations: with the yaw bearing's mass at the tower top, and the hub's where it is off the apex.
+
+    A point on the shaft does not feel the rotor turn. A hub mass at a distance from the apex is therefore one at the apex and, on
+    the nacelle, what that leaves of first and second moments.
+    """
+    nacelle, hub, geometry = data["nacelle"], data["hub"], data["geometry"]
+    mass, bearing, off = (
+        float(nacelle["mass"]),
+        float(nacelle.get("yaw_bearing_mass", 0.0)),
+        float(hub.get("centre_of_mass", 0.0)),
+    )
+    x, y, z = (float(v) for v in nacelle["centre_of_mass"])
+    # the report gives the inertia about the yaw axis
+    inertia = np.diag([0.0, 0.0, nacelle["yaw_inertia"] - mass * (x * x + y * y)])
+    if bearing or off:
+        tilt = radians(geometry["shaft_tilt_deg"])
+        shaft = np.array([cos(tilt), 0.0, sin(tilt)])
+        apex = np.array([0.0, 0.0, geometry["tower_top_to_shaft"]]) + geometry["overhang"] * shaft
+        points = [(mass, np.array([x, y, z])), (bearing, np.zeros(3))]
+        points += [(hub["mass"], apex + off * shaft), (-hub["mass"], apex)]
+        total = mass + bearing
+        centre = np.sum([m * at for m, at in points], axis=0) / total
+        inertia = inertia + np.diag(np.diag(_second_moment(points) - _second_moment([(total, centre)])))
+        mass, (x, y, z) = total, centre
+    return {
+        "n_m": mass, "n_x": x, "n_y": y, "n_z": z,
+        "n_ixx": inertia[0, 0], "n_iyy": inertia[1, 1], "n_izz": inertia[2, 2],
+    }  # fmt: skip
+
+
+def _second_moment(points: list[tuple[float, Any]]) -> Any:
+    """Inertia tensor (3, 3) of point masses about the origin."""
+    return np.sum([m * (at @ at * np.eye(3) - np.outer(at, at)) for m, at in points], axis=0)
 
 
 def _tower(tower: TowerModes) -> dict[str, float]:
@@ -124,11 +174,11 @@ def generator_law(generator: Mapping[str, Any]) -> dict[str, float]:
     r = generator["regions"]
     start = r["region_3_speed_rpm"] * np.pi / 30
     synchronous = start / (1 + r["slip_percent"] / 100)
-    power = r["rated_mechanical_power"]
+    power, torque = r.get("rated_mechanical_power") or 0.0, r.get("rated_torque") or 0.0
     # region 2.5 is a line from zero torque at the synchronous speed through the rated power at region 3's first speed
-    slope = power / start / (start - synchronous)
+    slope = (power / start + torque) / (start - synchronous)
     return {
-        "tg_k": gain, "tg_a2": slope, "tg_ws": synchronous, "tg_t2": 0.0, "tg_p": power, "tg_t": 0.0,
+        "tg_k": gain, "tg_a2": slope, "tg_ws": synchronous, "tg_t2": 0.0, "tg_p": power, "tg_t": torque,
         "tg_e": r["blend_torque"],
     }  # fmt: skip
 

@@ -140,7 +140,9 @@ def _steady(
             else:
                 out.append(mean[row] if layout.coordinates[row].position.name in _TOWER else mean[row] / 50)
                 number += 1
-        drive = mean[layout.rotor], mean[layout.generator] / ratio
+        # a rigid shaft has no twist to be found: its generator turns as the rotor does
+        twisting = unknown[at_speed - 1] if p["g_rigid"] else mean[layout.generator] / ratio
+        drive = mean[layout.rotor], twisting
         return np.array([*out, *drive, *(mean[freedoms:] / own)])
 
     guesses, slowest = turbine.guesses(wind)

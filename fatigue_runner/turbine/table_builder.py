@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -74,9 +74,14 @@ def build_tables(
     skewed_wake: bool = True,
     tip_speed_ratio: Array = TIP_SPEED_RATIO,
     pitch_deg: Array = PITCH_DEG,
+    *,
+    told: Callable[[float], None] = lambda share: None,
 ) -> Array:
-    """Coefficients (m, n, k) of `table_names` over tip-speed ratios (n,) and pitch angles (k,) [deg]."""
-    columns = [load_coefficients(blade, tip_speed_ratio, np.radians(p), skewed_wake) for p in pitch_deg]
+    """Coefficients (m, n, k) of `table_names` over tip-speed ratios (n,) and pitch angles (k,) [deg]; told: gets the share that is done."""
+    columns = []
+    for number, pitch in enumerate(pitch_deg):
+        told(number / len(pitch_deg))
+        columns.append(load_coefficients(blade, tip_speed_ratio, np.radians(pitch), skewed_wake))
     return np.stack(columns, axis=-1)
 
 
@@ -100,8 +105,12 @@ def turbine_inputs(parameters: Mapping[str, Any]) -> str:
 @lru_cache(maxsize=8)
 def _read_airfoils(path: str) -> Mapping[str, Any]:
     source = read_mapping(Path(path), "polar file", "columns, airfoils")
-    validated(AirfoilFile, source)
-    return dict(source.data)
+    rows = validated(AirfoilFile, source).airfoils
+    # lists as they stand in the file: the tables' hash knows a whole number from another
+    given = source.data["airfoils"]
+    return dict(source.data) | {
+        "airfoils": {k: rows[k] if isinstance(v, str) else v for k, v in given.items()}
+    }
 
 
 def _airfoils(parameters: Mapping[str, Any]) -> Mapping[str, Any]:

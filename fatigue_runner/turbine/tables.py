@@ -186,7 +186,7 @@ def read_tables(path: Path, interpolation: str) -> AeroTables:
     """Tables of an npz written by tools/build_aero_tables.py. Raises InputError where it is missing or of another kind."""
     if not path.is_file():
         raise InputError(
-            f"aerodynamic tables {path} do not exist; make them with `fatigue-runner turbine FILE --write-tables`"
+            f"aerodynamic tables {path} do not exist; make them with `fatigue-runner turbine tables FILE`"
         )
     with np.load(path, allow_pickle=False) as data:
         names = [str(n) for n in data["names"]]

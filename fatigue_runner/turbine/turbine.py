@@ -19,7 +19,7 @@ from fatigue_runner.layout import DEFAULT_FAMILY, FAMILIES, HARMONICS, RPM, Chan
 from fatigue_runner.rotor import SQUARE, Rotor
 from fatigue_runner.turbine.dynamics import CONTROLLED_BY, UNCONTROLLED, Dynamics
 from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turbine_file
-from fatigue_runner.turbine.parameters import at_pitch, checked, equation_parameters
+from fatigue_runner.turbine.parameters import DEFAULTS, at_pitch, checked, equation_parameters
 from fatigue_runner.turbine.rated import rated_rotor_speed
 from fatigue_runner.turbine.rigid import RigidRotor
 from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
@@ -45,6 +45,7 @@ class Turbine:
     control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it;
     tower: heights and diameters as `rotor.Rotor` has them, which only the wind sees;
     sections {name: (outer diameter, wall) [m]}: circles whose wear is counted, which change no motion;
+    base_height: of the tower's foot above ground [m];
     operating_wind: from cut-in to cut-out [m/s], None where the file does not say;
     generator_efficiency: electrical power over mechanical power.
     """
@@ -61,6 +62,7 @@ class Turbine:
     sections: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     operating_wind: tuple[float, float] | None = None
     generator_efficiency: float = 1.0
+    base_height: float = 0.0
 
     @property
     def layout(self) -> Layout:
@@ -258,9 +260,9 @@ class Turbine:
 
     @property
     def hub_height(self) -> float:
-        """Height of the rotor apex above the tower base [m]."""
+        """Height of the rotor apex above ground [m]."""
         p = self.parameters
-        return p["t_h"] + p["tower_to_shaft"] + p["overhang"] * p["sin_tilt"]
+        return self.base_height + p["t_h"] + p["tower_to_shaft"] + p["overhang"] * p["sin_tilt"]
 
     def rhs(
         self,
@@ -371,6 +373,8 @@ def _operated(turbine: Turbine, operation: str) -> Turbine:
 def _hash(turbine: Turbine) -> str:
     digest = hashlib.sha256()
     for name, value in sorted(turbine.parameters.items()):
+        if DEFAULTS.get(name) == value:
+            continue
         # nine digits: the mode integrals' last bits depend on the BLAS kernels that a processor gets
         digest.update(f"{name}={value:.8e};".encode())
     if turbine.family != DEFAULT_FAMILY:
@@ -474,6 +478,7 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     wind = data.get("operating_wind")
     return Turbine(
         name, parameters, tables, description, UNCONTROLLED[family], control, tower=tower, family=family,
+        base_height=float(data["geometry"]["tower_base_height"]),
         sections=sections, operating_wind=None if wind is None else (float(wind[0]), float(wind[1])),
         generator_efficiency=float(data["generator"].get("efficiency", 1.0)),
     )  # fmt: skip
@@ -504,5 +509,5 @@ def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:
     if made_for and "airfoils" in data["aerodynamics"] and made_for != turbine_inputs(data):
         raise InputError(
             f"aerodynamic tables {path} were made for another blade, cone or airfoil than turbine {data.get('name', '?')} has; "
-            "make them anew with `fatigue-runner turbine FILE --write-tables`"
+            "make them anew with `fatigue-runner turbine tables FILE`"
         )

@@ -59,7 +59,6 @@ REFUSED = {
     "number for a section": ("hub: 3", "mine.yaml:3: hub: must be a section with the keys mass, inertia"),
     "no torque law": ("generator: {law: optimum}", "'optimum' is not known; did you mean 'optimal'?"),
     "short vector": ("nacelle: {centre_of_mass: [1, 2]}", "must hold at least 3 value(s); got [1, 2]"),
-    "hub before the apex": ("hub: {centre_of_mass: 1.0}", "must be 0: the model has the hub's mass at the rotor apex"),
     "more than all": ("drivetrain: {gearbox_efficiency: 2}", "gearbox_efficiency must be at most 1; got 2"),
     "impossible inertia": ("nacelle: {mass: 1e9}", "mine.yaml:3: nacelle: yaw_inertia 2.60789e+06 kg.m2 is about the yaw axis"),
     "hub beyond the tip": ("geometry:\n  tip_radius: 1", "mine.yaml:3: geometry: hub_radius 1.5 m must be below tip_radius 1 m"),

@@ -85,6 +85,8 @@ PARAMETERS = {
     "n_izz": "nacelle inertia about its centre, yaw [kg m2]",
     "g_i": "generator inertia on the high-speed side [kg m2]",
     "g_ratio": "gearbox ratio",
+    "g_efficiency": "gearbox efficiency: torque on the low-speed side is that on the high-speed side by it (as ElastoDyn)",
+    "g_rigid": "1: the generator turns with the rotor, spring and damper only hold their angles together; 0: a flexible shaft",
     "d_k": "drivetrain torsional stiffness, low-speed side [N m/rad]",
     "d_d": "drivetrain torsional damping, low-speed side [N m s/rad]",
     "t_h": "tower height [m]",
@@ -966,11 +968,22 @@ def generator_torque(sheet: Sheet, controlled: bool) -> sp.Expr:
     return sheet.let("torque_gen", below - (excess + sp.sqrt(excess * excess + blend)) / 2)
 
 
-def shaft_torque(sheet: Sheet) -> sp.Expr:
-    """Torque of the drivetrain spring and damper on the rotor side."""
+def shaft_torque(sheet: Sheet, torque: sp.Expr) -> sp.Expr:
+    """Torque of the drivetrain on the rotor side: of spring and damper; through a rigid shaft also that of the generator, `torque`.
+
+    What the generator's inertia takes through a rigid shaft is not in it: that is in the mass matrix (`rigid_inertia`).
+    """
     phi, gen, phid, gend = (sheet.states.of(name, k) for k in (0, 1) for name in ("phi", "gen"))
     inverse = sheet.constant(1 / P["g_ratio"])
-    return sheet.let("torque_shaft", P["d_k"] * (phi - gen * inverse) + P["d_d"] * (phid - gend * inverse))
+    spring = P["d_k"] * (phi - gen * inverse) + P["d_d"] * (phid - gend * inverse)
+    return sheet.let(
+        "torque_shaft", spring + sheet.constant(P["g_rigid"] * P["g_ratio"] / P["g_efficiency"]) * torque
+    )
+
+
+def rigid_inertia(sheet: Sheet) -> sp.Expr:
+    """Inertia of the generator that a rigid shaft adds to the rotor's; what accelerates it goes through the gearbox, too."""
+    return sheet.constant(P["g_rigid"] * P["g_ratio"] ** 2 * P["g_i"] / P["g_efficiency"])
 
 
 # --- assembly ----------------------------------------------------------------------------------------------------------
@@ -1012,8 +1025,8 @@ def accelerations(
     aero_force, aero_moment = aero_resultant(sheet, aero)
     net_force = sheet.let_vector("net_force", aero_force - r.force)
     net_moment = sheet.let_vector("net_moment", aero_moment - r.moment)
-    twist = shaft_torque(sheet)
     torque = generator_torque(sheet, controlled)
+    twist = shaft_torque(sheet, torque)
 
     # columns of the mass matrix that belong to the rotor; `iw` = moment about the apex per unit acceleration
     columns = {"a": (m.t_a, m.w_a), "s": (m.t_s, m.w_s), "p": (sp.zeros(3, 1), sp.Matrix([1, 0, 0]))}
@@ -1029,6 +1042,7 @@ def accelerations(
         if r.edge is not None:
             mass["e" + key] = t.dot(r.edge.linear) + w.dot(r.edge.angular)
     force["p"] -= twist
+    mass["pp"] += rigid_inertia(sheet)
 
     b_ff = sheet.constant(P["b_fxfx"] + P["b_fyfy"])
     b_fe = sheet.constant(P["b_fxex"] + P["b_fyey"])
@@ -1050,8 +1064,9 @@ def accelerations(
         result = solve_own_edges(sheet, mass, force, b_ff, b_fe, b_ee)
     else:
         result = solve(sheet, mass, force, b_ff, b_fe)
-    inverse = sheet.constant(1 / P["g_ratio"])
-    generator = (twist * inverse - torque) * sheet.constant(1 / P["g_i"])
+    share = sheet.constant(P["g_efficiency"] / P["g_ratio"])
+    generator = (twist * share - torque) * sheet.constant(1 / P["g_i"])
+    generator += sheet.constant(P["g_rigid"] * P["g_ratio"]) * result["p"]
     result |= {"phi": result["p"], "gen": sheet.let("x_gen", generator)}
     return sheet, tuple(result[name] for name in states.coordinates)
 
@@ -1303,8 +1318,8 @@ def load_channels(
     force = sheet.let_vector("rotor_force", force)
     moment = sheet.let_vector("rotor_moment", moment)
     out |= tower_base(sheet, top, force, moment)
-    out["low_speed_shaft_torque"] = shaft_torque(sheet)
-    out["generator_torque"] = generator_torque(sheet, controlled)
+    out["generator_torque"] = torque = generator_torque(sheet, controlled)
+    out["low_speed_shaft_torque"] = shaft_torque(sheet, torque) + rigid_inertia(sheet) * phidd
     out["rotor_thrust"] = sheet.constant(3 * P["cos_cone"]) * aero.mean("thrust") * aero.pressure
     out["tower_top_fore_aft_acceleration"], out["tower_top_side_side_acceleration"] = tower(sheet, 2)
     return sheet, out
