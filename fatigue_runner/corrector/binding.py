@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import method as find_method
+from fatigue_runner.turbine import load_turbine
+from fatigue_runner.turbine.distance import apart
 from fatigue_runner.turbine.turbine import FIXED
 
 if TYPE_CHECKING:
@@ -53,9 +55,10 @@ class Binding:
                     f"was trained for {self.turbine} at fixed pitch, under operation {turbine.operation!r} the equations are others; "
                     f"leave it out (recipes do not know operations yet), or use `operation: {FIXED}`"
                 )
+            file = turbine.file or "FILE"
             return (
                 f"was trained for turbine {self.turbine} ({self.turbine_hash[:12]}), this is {turbine.name} "
-                f"({turbine.hash[:12]}); train one with `fatigue-runner train`"
+                f"({turbine.hash[:12]}){self._difference(turbine)}; `fatigue-runner train --turbine {file}` trains the standard set for it"
             )
         if method != self.method:
             return f"was trained for {self.method}, the campaign uses {method}; use `method: {self.method}` or train one"
@@ -65,6 +68,15 @@ class Binding:
                 f"train one with `fatigue-runner train RECIPE --step {step:g}`"
             )
         return ""
+
+    def _difference(self, turbine: Turbine) -> str:
+        """How far a turbine is from the one of the training, where that is shipped and unchanged."""
+        try:
+            trained = load_turbine(self.turbine).operated(turbine.operation)
+        except InputError:
+            return ""
+        known = self.turbine_hash in (trained.hash, trained.operated(FIXED).hash)
+        return f", which differs in {apart(turbine, trained)}" if known else ""
 
 
 def correctable(method: str) -> Method:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fatigue_runner import shipped
 from fatigue_runner.corrector import families  # noqa: F401 - registers the recipes
 from fatigue_runner.corrector.artefact import save
 from fatigue_runner.corrector.binding import Binding, correctable
@@ -103,6 +104,19 @@ def train(
     figures = validate(corrector, recipe, turbine)
     facts = {"seconds": round(time.perf_counter() - begin, 1), **learned.facts}
     return replace(corrector, validation=figures, training=facts)
+
+
+STANDARD_FAMILY, STANDARD_TURBINE = "affine", "nrel5mw"
+
+
+def standard_recipes() -> list[Path]:
+    """The shipped recipes that take seconds and are trained anew for every turbine, by name."""
+    found = []
+    for path in sorted(shipped.correctors().glob("*.yaml")):
+        data = read_mapping(path, "recipe", "name, family, ...").data
+        if data.get("family") == STANDARD_FAMILY and data.get("turbine") == STANDARD_TURBINE:
+            found.append(path)
+    return found
 
 
 def train_file(

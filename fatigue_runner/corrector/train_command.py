@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from fatigue_runner.errors import InputError
 from fatigue_runner.terminal import command_group, console
 
 if TYPE_CHECKING:
@@ -18,8 +19,15 @@ app = command_group()
 @app.command()
 def train(
     recipe: Annotated[
-        Path, typer.Argument(metavar="RECIPE", help="The recipe's YAML file.", show_default=False)
-    ],
+        Path | None,
+        typer.Argument(
+            metavar="[RECIPE]", help="The recipe's YAML file; none with --turbine trains the standard set."
+        ),
+    ] = None,
+    turbine: Annotated[
+        str | None,
+        typer.Option("--turbine", "-t", help="Another turbine than the recipe's: a name or a YAML."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder of the result; default: the recipe's.")
     ] = None,
@@ -40,15 +48,45 @@ def train(
         fatigue-runner train correctors/rk4-100ms.yaml
 
         fatigue-runner train correctors/rk4-100ms.yaml --step 0.08 --name rk4-80ms --out runs
+
+        fatigue-runner train --turbine my-turbine.yaml
     """
     to = console()
-    overrides: dict[str, Any] = {"step": step, "seed": seed, "name": name}
+    if recipe is None:
+        if turbine is None:
+            raise InputError("give a recipe, or --turbine FILE for the standard set of a turbine")
+        if step is not None or name is not None or tune:
+            raise InputError("--step, --name and --tune are of one recipe; give it, or leave them out")
+        raise typer.Exit(_train_standard_set(turbine, out, seed, to))
+    overrides: dict[str, Any] = {"step": step, "seed": seed, "name": name, "turbine": turbine}
     if tune:
         settings = _tune(recipe, out, overrides, tune, tune_epochs, to)
         if settings is None:
             raise typer.Exit(130)
         overrides |= {"training": settings, "seed": None}
     _train(recipe, out, overrides, to)
+
+
+def _train_standard_set(turbine: str, out: Path | None, seed: int | None, console: Console) -> int:
+    """Train the shipped recipes of the affine family for a turbine, NAME-TURBINE beside its file; the exit code: 1 where some cannot be."""
+    from fatigue_runner.corrector.train import standard_recipes
+    from fatigue_runner.turbine import load_turbine
+
+    found = load_turbine(turbine)
+    folder = out or (Path(turbine).parent if Path(turbine).suffix else Path()) / "correctors"
+    failed = []
+    for recipe in standard_recipes():
+        name = f"{recipe.stem}-{found.name}"
+        console.print(f"[bold]{name}[/]")
+        try:
+            _train(recipe, folder, {"name": name, "turbine": turbine, "seed": seed}, console)
+        except InputError as error:
+            failed.append(name)
+            console.print(f"left out: {error}", soft_wrap=True)
+    if failed:
+        console.print(f"not trained: {', '.join(failed)}", soft_wrap=True)
+    console.print(f"use one as `corrector: {folder}/NAME.safetensors` in a campaign", soft_wrap=True)
+    return 1 if failed else 0
 
 
 def _train(recipe: Path, out: Path | None, overrides: dict[str, Any], console: Console) -> None:

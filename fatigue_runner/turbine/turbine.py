@@ -47,7 +47,8 @@ class Turbine:
     sections {name: (outer diameter, wall) [m]}: circles whose wear is counted, which change no motion;
     base_height: of the tower's foot above ground [m];
     operating_wind: from cut-in to cut-out [m/s], None where the file does not say;
-    generator_efficiency: electrical power over mechanical power.
+    generator_efficiency: electrical power over mechanical power;
+    file: the name or path that it was loaded by, "" for a mapping.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Turbine:
     operating_wind: tuple[float, float] | None = None
     generator_efficiency: float = 1.0
     base_height: float = 0.0
+    file: str = ""
 
     @property
     def layout(self) -> Layout:
@@ -479,6 +481,7 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     return Turbine(
         name, parameters, tables, description, UNCONTROLLED[family], control, tower=tower, family=family,
         base_height=float(data["geometry"]["tower_base_height"]),
+        file="" if isinstance(source, Mapping) else str(source),
         sections=sections, operating_wind=None if wind is None else (float(wind[0]), float(wind[1])),
         generator_efficiency=float(data["generator"].get("efficiency", 1.0)),
     )  # fmt: skip

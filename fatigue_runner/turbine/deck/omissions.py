@@ -48,15 +48,15 @@ _FREEDOMS = {
 
 def omissions(deck: Deck, data: Mapping[str, Any]) -> list[Omission]:
     """In the order of the deck: structure, support, aerodynamics, control. data: the turbine's mapping."""
-    return [*_structure(deck), *_support(deck, data), *_aerodynamics(deck), *_control(deck, data)]
+    return [*_structure(deck, data), *_support(deck, data), *_aerodynamics(deck), *_control(deck, data)]
 
 
-def _structure(deck: Deck) -> Iterator[Omission]:
+def _structure(deck: Deck, data: Mapping[str, Any]) -> Iterator[Omission]:
     elasto, main = deck.elasto, deck.main
     for key, (name, means) in _FREEDOMS.items():
         if elasto.flag(key, default=False):
             yield Omission(f"{name} ({key} is on)", means)
-    if elasto.flag("EdgeDOF", default=True):
+    if elasto.flag("EdgeDOF", default=True) and data.get("model") != "t2b2cg":
         yield Omission(
             "edgewise modes of single blades (EdgeDOF)",
             "the model's edge mode is collective: edgewise DELs in turbulence are 3 to 7 % below OpenFAST's on the 5-MW; whirling in the "
