@@ -185,9 +185,9 @@ class TestInACampaign:
         from fatigue_runner.campaign.plan import make_plan
 
         campaign = self.campaign(made)
-        assert make_plan(campaign).notes == []
+        assert not [note for note in make_plan(campaign).notes if "trained" in note]
         campaign["wind"]["speeds"] = [5.0, 7.4, 10.5]
-        (note,) = make_plan(campaign).notes
+        (note,) = (note for note in make_plan(campaign).notes if "trained" in note)
         assert (
             "quick was trained on winds of 6 to 9 m/s; 2 mean wind speed(s) lie outside, up to 10.5 m/s"
             in note

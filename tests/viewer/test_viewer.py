@@ -137,7 +137,7 @@ def test_what_is_not_there_is_named(tmp_path, run_folder):
 
 def test_missing_viewer_says_how_to_install_it(tmp_path, monkeypatch):
     monkeypatch.setattr(window, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"pip install 'fatigue-runner\[view\]'"):
+    with pytest.raises(InputError, match="install it with pip install 'rerun-sdk"):
         view([write(tmp_path, rows=5)])
 
 

@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.special import j0
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.fatigue.lifetime import IEC_REFERENCE_SPEED
+from fatigue_runner.fatigue.climate import IEC_REFERENCE_SPEED
 from fatigue_runner.wind import spectrum
 
 
