@@ -13,7 +13,6 @@ from test_equations import free_turbine, violent_states
 
 import fatigue_runner as fr
 from fatigue_runner.errors import InputError
-from fatigue_runner.integrators import METHODS
 from fatigue_runner.integrators.stability import stability_limit
 from fatigue_runner.layout import T2B1I1CG, T2B2CG
 from fatigue_runner.logbook import read_log, write_log
@@ -203,10 +202,10 @@ def test_exponential_steps_take_the_edge_whirl_for_linear(run):
     assert errors[0] < errors[1] < 1e-3
 
 
-@pytest.mark.slow(reason="compiles every method for these states")
+@pytest.mark.slow(reason="compiles a method of every family for these states, twice")
 @pytest.mark.parametrize("operation", ["fixed", "controlled"])
-@pytest.mark.parametrize("method", sorted(METHODS))
-def test_every_method_runs_on_it_in_every_operation(method, operation):
+@pytest.mark.parametrize("method", ["rk4", "abm4", "etdrk4", "etdabm4"])
+def test_every_family_of_methods_runs_on_it_in_every_operation(method, operation):
     step = 0.2 * stability_limit(load_turbine("nrel5mw_edges"), method)
     wind = fr.TurbulentWind(mean=9.0, intensity=0.14, seed=1, duration=4.0, harmonics=6)
     runs = [
@@ -224,4 +223,4 @@ def test_every_method_runs_on_it_in_every_operation(method, operation):
     assert runs[0].diverged_at is None
     scale = np.ptp(runs[1].state, axis=0)
     errors = np.abs(runs[0].state - runs[1].state).max(axis=0) / scale
-    assert errors.max() < (0.5 if method == "euler" else 0.02)
+    assert errors.max() < 0.02
