@@ -18,6 +18,7 @@ w = (S_ff f^2 + 2 S_fe f e + S_ee e^2)/2. Only integrals of products of (1, r, p
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import sympy as sp
@@ -1124,6 +1125,45 @@ def blade_forces(sheet: Sheet, m: Motion, aero: Aerodynamics) -> dict[str, sp.Ex
     return out
 
 
+def factored(
+    sheet: Sheet,
+    keys: Sequence[str],
+    mass: dict,
+    force: dict,
+    eliminated: Callable,
+    constant: Sequence[str] = (),
+) -> dict[str, sp.Expr]:
+    """Accelerations of the coordinates `keys` by LDL^T of their mass matrix, less what was `eliminated` from row i and column j (or `q`,
+    the right side). constant: of which coordinates, the first, the pivot depends on parameters only."""
+    lower: dict[tuple[str, str], sp.Expr] = {}
+    pivot: dict[str, sp.Expr] = {}
+    scaled_row: dict[tuple[str, str], sp.Expr] = {}
+    rhs: dict[str, sp.Expr] = {}
+    for r, i in enumerate(keys):
+        right = sheet.let(f"r_{i}", force[i] - eliminated(i, "q"))
+        for j in keys[: r + 1]:
+            m_ij = mass[i + j] if i + j in mass else mass[j + i]
+            s_ij = m_ij - eliminated(i, j)
+            s_ij = sheet.constant(s_ij) if i == j and i in constant else sheet.let(f"s_{i}{j}", s_ij)
+            for k in keys[: keys.index(j)]:
+                s_ij = s_ij - lower[i, k] * scaled_row[j, k]
+            if i != j:
+                scaled_row[i, j] = sheet.let(f"v_{i}{j}", s_ij)
+                lower[i, j] = sheet.let(f"l_{i}{j}", scaled_row[i, j] * pivot[j])
+            elif i in constant:
+                pivot[i] = sheet.constant(1 / s_ij)
+            else:
+                pivot[i] = sheet.let(f"inv_{i}", 1 / s_ij)
+        for j in keys[:r]:
+            right = right - lower[i, j] * rhs[j]
+        rhs[i] = sheet.let(f"z_{i}", right)
+    x: dict[str, sp.Expr] = {}
+    for r in range(len(keys) - 1, -1, -1):
+        i = keys[r]
+        x[i] = sheet.let(f"x_{i}", rhs[i] * pivot[i] - sum(lower[j, i] * x[j] for j in keys[r + 1 :]))
+    return x
+
+
 def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Expr]:
     """Block elimination of the flap coordinates (their block is b_ff times unity), then LDL^T of the 4 x 4 rest."""
     inverse = sheet.constant(1 / b_ff)
@@ -1149,32 +1189,7 @@ def solve(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe) -> dict[str, sp.Exp
             return inverse * sum(x * y for x, y in zip(column[i], other, strict=True))
         return eliminated(j, i)
 
-    lower: dict[tuple[str, str], sp.Expr] = {}
-    pivot: dict[str, sp.Expr] = {}
-    scaled_row: dict[tuple[str, str], sp.Expr] = {}
-    rhs: dict[str, sp.Expr] = {}
-    for r, i in enumerate(keys):
-        right = sheet.let(f"r_{i}", force[i] - eliminated(i, "q"))
-        for j in keys[: r + 1]:
-            m_ij = mass[i + j] if i + j in mass else mass[j + i]
-            s_ij = m_ij - eliminated(i, j)
-            s_ij = sheet.constant(s_ij) if i == j == "e" else sheet.let(f"s_{i}{j}", s_ij)
-            for k in keys[: keys.index(j)]:
-                s_ij = s_ij - lower[i, k] * scaled_row[j, k]
-            if i == "e":
-                pivot[i] = sheet.constant(1 / s_ij)
-            elif i == j:
-                pivot[i] = sheet.let(f"inv_{i}", 1 / s_ij)
-            else:
-                scaled_row[i, j] = sheet.let(f"v_{i}{j}", s_ij)
-                lower[i, j] = sheet.let(f"l_{i}{j}", scaled_row[i, j] * pivot[j])
-        for j in keys[:r]:
-            right = right - lower[i, j] * rhs[j]
-        rhs[i] = sheet.let(f"z_{i}", right)
-    x: dict[str, sp.Expr] = {}
-    for r in range(3, -1, -1):
-        i = keys[r]
-        x[i] = sheet.let(f"x_{i}", rhs[i] * pivot[i] - sum(lower[j, i] * x[j] for j in keys[r + 1 :]))
+    x = factored(sheet, keys, mass, force, eliminated, constant=("e",))
     common = sheet.let("x_common", b_fe * x["e"] + column["p"] * x["p"])
     for n in blades:
         coupling = sum(column[k][n - 1] * x[k] for k in ("a", "s"))
@@ -1206,29 +1221,7 @@ def solve_own_edges(sheet: Sheet, mass: dict, force: dict, b_ff, b_fe, b_ee) -> 
             for mode in "fe"
         )
 
-    lower: dict[tuple[str, str], sp.Expr] = {}
-    pivot: dict[str, sp.Expr] = {}
-    scaled_row: dict[tuple[str, str], sp.Expr] = {}
-    rhs: dict[str, sp.Expr] = {}
-    for r, i in enumerate(keys):
-        right = sheet.let(f"r_{i}", force[i] - eliminated(i, "q"))
-        for j in keys[: r + 1]:
-            m_ij = mass[i + j] if i + j in mass else mass[j + i]
-            s_ij = sheet.let(f"s_{i}{j}", m_ij - eliminated(i, j))
-            for k in keys[: keys.index(j)]:
-                s_ij = s_ij - lower[i, k] * scaled_row[j, k]
-            if i == j:
-                pivot[i] = sheet.let(f"inv_{i}", 1 / s_ij)
-            else:
-                scaled_row[i, j] = sheet.let(f"v_{i}{j}", s_ij)
-                lower[i, j] = sheet.let(f"l_{i}{j}", scaled_row[i, j] * pivot[j])
-        for j in keys[:r]:
-            right = right - lower[i, j] * rhs[j]
-        rhs[i] = sheet.let(f"z_{i}", right)
-    x: dict[str, sp.Expr] = {}
-    for r in range(len(keys) - 1, -1, -1):
-        i = keys[r]
-        x[i] = sheet.let(f"x_{i}", rhs[i] * pivot[i] - sum(lower[j, i] * x[j] for j in keys[r + 1 :]))
+    x = factored(sheet, keys, mass, force, eliminated)
     for n in blades:
         flap, edge = (
             weight[mode] * (column["q"][mode][n - 1] - sum(column[k][mode][n - 1] * x[k] for k in keys))
