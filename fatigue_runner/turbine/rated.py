@@ -43,6 +43,8 @@ def rated_speed_wind(turbine: Turning, pitch: float) -> float | None:
     By its steady rotation from light winds up, to a tenth of a metre per second: just above there may be none, which takes long to find.
     """
     rated = rated_rotor_speed(turbine)
+    if rated is None:
+        return None
     low, high = WINDS
     before = None
     for wind in (low + STEP * i for i in range(round((high - low) / STEP) + 1)):
@@ -52,8 +54,8 @@ def rated_speed_wind(turbine: Turning, pitch: float) -> float | None:
             if before is not None:
                 return wind
             continue
-        if rated is None or speed > rated:
-            return None if rated is None or before is None else wind
+        if speed > rated:
+            return None if before is None else wind
         slope = 0.0 if before is None else speed - before
         if speed + slope > rated:
             return wind + STEP * (rated - speed) / slope
