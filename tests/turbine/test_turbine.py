@@ -102,6 +102,17 @@ def test_tilt_and_cone_take_two_fifths_of_the_flap_load_cycle_under_shear():
     assert loads["nrel5mw"] / loads["t2b1i1cg"] == pytest.approx(0.6, abs=0.05)
 
 
+@pytest.mark.parametrize("name", ["nrel5mw", "t2b1i1cg", "nrel5mw_edges"])
+def test_a_turbine_that_stands_still_has_accelerations_and_no_torque(name):
+    """Power over speed is no number there, and `initial: paper`, the literal start of arXiv:2504.05493, has this speed."""
+    turbine = load_turbine(name)
+    still = np.zeros((1, turbine.layout.size))
+    assert np.isfinite(turbine.rhs(still[0], 8.0)).all()
+    loads = turbine.loads(still, np.array([[8.0, 0.0, 0.0]]))
+    assert all(np.isfinite(series).all() for series in loads.values())
+    assert loads["generator_torque"][0] == pytest.approx(0.0, abs=1.0)
+
+
 @pytest.mark.parametrize("name", ["nrel5mw", "t2b1i1cg"])
 @pytest.mark.parametrize("wind", [5.0, 8.0, 11.0])
 def test_the_operating_point_is_where_the_turbine_stays(name, wind):

@@ -965,7 +965,8 @@ def generator_torque(sheet: Sheet, controlled: bool) -> sp.Expr:
     optimal = sheet.let("torque_optimal", P["tg_k"] * w * w)
     rise = sheet.let("torque_rise", P["tg_a2"] * (w - P["tg_ws"]) + P["tg_t2"] - optimal)
     below = sheet.let("torque_below", optimal + (rise + sp.sqrt(rise * rise + blend)) / 2)
-    excess = sheet.let("torque_excess", below - P["tg_t"] - P["tg_p"] / w)
+    # a generator that stands still would divide by zero; the addend is lost in the rounding of any speed but zero
+    excess = sheet.let("torque_excess", below - P["tg_t"] - P["tg_p"] / (w + sp.Float("1e-100")))
     return sheet.let("torque_gen", below - (excess + sp.sqrt(excess * excess + blend)) / 2)
 
 
