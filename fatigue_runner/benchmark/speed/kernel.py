@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 import time
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,11 @@ STEP_METHODS = ("heun", "rk3", "rk4", "tsit5", "dop853", "ab4", "abm4", "etdrk4"
 LOOKUP_OPERATIONS = 6  # of one cubic: three multiplications and three additions
 
 
-def operations() -> int:
+def operations(generated: ModuleType = right_hand_side.kernel) -> int:
     """Floating-point operations of one evaluation for one case, counted in the kernel's source; a division or root is one."""
     counter = _Operations()
-    counter.visit(ast.parse(right_hand_side.source()))
-    return counter.count + LOOKUP_OPERATIONS * right_hand_side.look_ups()
+    counter.visit(ast.parse(right_hand_side.source(generated)))
+    return counter.count + LOOKUP_OPERATIONS * right_hand_side.look_ups(generated)
 
 
 class _Operations(ast.NodeVisitor):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -22,14 +23,14 @@ from fatigue_runner.wind import stack_cells
 Array = np.ndarray
 
 
-def source() -> str:
+def source(generated: ModuleType = kernel) -> str:
     """Python source of one evaluation for one lane, as it was generated."""
-    return kernel.RHS_CODE.text
+    return str(generated.RHS_CODE.text)
 
 
-def look_ups() -> int:
+def look_ups(generated: ModuleType = kernel) -> int:
     """Tables that one evaluation looks up."""
-    return kernel.EQUATION_TABLES
+    return int(generated.EQUATION_TABLES)
 
 
 def packed() -> Callable[..., None]:
