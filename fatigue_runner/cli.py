@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
@@ -107,11 +108,30 @@ def run(
         typer.Option("--pace", min=0.0, help="Play one case at this multiple of real time; implies --live."),
     ] = None,
     live_case: Annotated[
-        str | None, typer.Option("--live-case", help="The case to show; default: the first.")
+        str | None,
+        typer.Option(
+            "--live-case",
+            help="The case to show, default the first that is done; implies --live.",
+            show_default=False,
+        ),
     ] = None,
     viewer_port: Annotated[
-        int | None, typer.Option("--viewer-port", help="Port of a viewer that is already open here.")
+        int | None,
+        typer.Option(
+            "--viewer-port",
+            min=1,
+            max=65535,
+            help="Port of a viewer that is already open here; implies --live.",
+            show_default=False,
+        ),
     ] = None,
+    live_share: Annotated[
+        float,
+        typer.Option(
+            "--live-share",
+            help="Part of a core that watching may take where the workers leave none idle (docs/viewer.md).",
+        ),
+    ] = 0.2,
 ) -> None:
     """Run a campaign, or the rest of one, and say which integrator is good enough.
 
@@ -131,11 +151,11 @@ def run(
     to = console()
     with ExitStack() as until_the_end:
         watch = None
-        if live or pace is not None:
+        if live or any(asked is not None for asked in (pace, live_case, viewer_port)):
             from fatigue_runner.viewer.live import watcher
 
             watch = until_the_end.enter_context(
-                watcher(pace=pace, case=live_case, port=viewer_port, say=to.print)
+                watcher(pace=pace, case=live_case, port=viewer_port, share=live_share, say=_plainly(to))
             )
         try:
             results = run_campaign(
@@ -145,6 +165,11 @@ def run(
             raise CampaignInterrupted("interrupted; the same command goes on") from None
     _print_outcome(results, to)
     raise typer.Exit(results.exit_code)
+
+
+def _plainly(console: Console) -> Callable[[str], None]:
+    """Prints a sentence as it is."""
+    return lambda text: console.print(text, markup=False, highlight=False)
 
 
 def _print_outcome(results: Results, console: Console) -> None:

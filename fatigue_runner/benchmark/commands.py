@@ -247,9 +247,6 @@ def logs(
 def live(
     rounds: Annotated[int, typer.Option("--rounds", min=1, help="Runs of every situation, in turn.")] = 5,
     duration: Annotated[float, typer.Option("--duration", min=1, help="Simulated seconds per case.")] = 120.0,
-    at_once: Annotated[
-        bool, typer.Option("--at-once", help="Open the viewer in the middle of the run, as in a long one.")
-    ] = False,
     json: Json = None,
 ) -> None:
     """What it costs a campaign to be watched: viewer open, absent, stopped, killed, beside the same campaign unwatched.
@@ -261,6 +258,6 @@ def live(
     from fatigue_runner.benchmark.pages import tables
     from fatigue_runner.benchmark.speed import live as measured
 
-    result = measured.measure(rounds, duration, at_once=at_once, say=_say)
+    result = measured.measure(rounds, duration, say=_say)
     console(110).print(tables.live(result))
     _write(result, json)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from fatigue_runner import channels
 from fatigue_runner.viewer.cases import Viewed
 from fatigue_runner.viewer.inflow import BLADE_WIND, SPAN
-from fatigue_runner.viewer.recording import TIMELINE, band_lane
-from fatigue_runner.viewer.styles import read_unit
+from fatigue_runner.viewer.recording import SCALE_BOUNDS, TIMELINE, logarithm, series
+from fatigue_runner.viewer.styles import SOLVER_SERIES, read_unit, short_label
 
 LONGEST_WHOLE = 180.0  # s; oscillations of a longer log would be a solid band
 _BACKGROUND = [24, 28, 36]
@@ -38,10 +39,10 @@ def first_screen(cases: Sequence[Viewed], playing: bool = True) -> rrb.Blueprint
     )
 
 
-def live_screen(cases: Sequence[Viewed], paced: bool, playing: bool = True) -> rrb.Blueprint:
+def live_screen(cases: Sequence[Viewed], pace: float | None) -> rrb.Blueprint:
     """The campaign as it fills, beside the case that is shown; only the campaign before there is one.
 
-    paced: the case comes in at its pace, and the time cursor follows; playing: else it is played again and again.
+    pace: the case comes in at its pace, and the time cursor follows; None: it is played again and again.
     """
     campaign = [
         rrb.TextDocumentView(origin="campaign/cases", name="Campaign"),
@@ -50,19 +51,10 @@ def live_screen(cases: Sequence[Viewed], paced: bool, playing: bool = True) -> r
     if not cases:
         screen: rrb.Container = rrb.Horizontal(*campaign, column_shares=[2, 3])
     else:
-        plots = [
-            _plot(
-                "Blade root flapwise moment [MN·m]",
-                cases,
-                _blades("load", "root_flapwise_moment", cases),
-                live=paced,
-            ),
-            _plot(
-                "Tower-base fore-aft moment [MN·m]", cases, ["load/tower_base_fore_aft_moment"], live=paced
-            ),
-        ]
+        paced = pace is not None
+        plots = [_plot(name, cases, paths, live=paced, width=290.0) for name, paths in _live_plots(cases)]
         screen = rrb.Horizontal(
-            rrb.Vertical(scene_view(cases), rrb.Horizontal(*plots), row_shares=[3, 2]),
+            rrb.Vertical(scene_view(cases), scales_view(), rrb.Horizontal(*plots), row_shares=[6, 1.2, 3]),
             rrb.Vertical(*campaign),
             column_shares=[3, 2],
         )
@@ -71,7 +63,7 @@ def live_screen(cases: Sequence[Viewed], paced: bool, playing: bool = True) -> r
         rrb.TimePanel(
             state="collapsed",
             timeline=TIMELINE,
-            play_state="following" if paced or not playing else "playing",
+            play_state="following" if pace is not None else "playing",
             loop_mode="all",
         ),
         rrb.SelectionPanel(state="hidden"),
@@ -81,12 +73,33 @@ def live_screen(cases: Sequence[Viewed], paced: bool, playing: bool = True) -> r
     )
 
 
+def _live_plots(cases: Sequence[Viewed]) -> list[tuple[str, list[str]]]:
+    """Titles, and paths of the curves."""
+    plots = [
+        _flap_plot(cases),
+        (_TOWER, ["load/tower_base_fore_aft_moment"]),
+    ]
+    return [*plots, (_WIND, _WIND_PATHS)] if len(cases[0].log.wind) else plots
+
+
+def shown_live(case: Viewed) -> set[str]:
+    """The curves of the live screen; the others are not forwarded while the campaign runs."""
+    return {path for _, paths in _live_plots([case]) for path in paths}
+
+
+def _flap_plot(cases: Sequence[Viewed]) -> tuple[str, list[str]]:
+    return "Blade root flapwise moment [MN·m]", _blades("load", "root_flapwise_moment", cases)
+
+
+_TOWER = "Tower-base fore-aft moment [MN·m]"
+_WIND = f"Wind at the blades ({SPAN:g} R) [m/s]"
+_WIND_PATHS = [*(f"wind/{channel.name}" for channel in BLADE_WIND), "wind/wind_speed"]
+
+
 def overview(cases: Sequence[Viewed]) -> rrb.Container:
     """Scene and the few plots that say how the run goes: beside one turbine, below a row of them."""
-    plots = [
-        _plot("Blade root flapwise moment [MN·m]", cases, _blades("load", "root_flapwise_moment", cases)),
-        _plot("Tower-base fore-aft moment [MN·m]", cases, ["load/tower_base_fore_aft_moment"]),
-    ]
+    flap, tower = _flap_plot(cases), (_TOWER, ["load/tower_base_fore_aft_moment"])
+    plots: list[rrb.View] = [_plot(name, cases, paths) for name, paths in (flap, tower)]
     if len(cases) == 1:
         solver, shares = _solver_plots(cases)[:3], [3.0, 3.0]
         if cases[0].log.control:
@@ -101,14 +114,16 @@ def overview(cases: Sequence[Viewed]) -> rrb.Container:
         beside: rrb.Container = rrb.Vertical(*plots, row_shares=shares)
         scene: rrb.Container | rrb.View = scene_view(cases)
         if len(cases[0].log.wind):
-            scene = rrb.Vertical(scene, _wind_plot(cases), row_shares=[4, 1])
+            scene = rrb.Vertical(scene, scales_view(), _wind_plot(cases), row_shares=[10, 1.7, 3.8])
+        else:
+            scene = rrb.Vertical(scene, scales_view(), row_shares=[10, 1.5])
         return rrb.Horizontal(scene, beside, column_shares=[3, 2], name="Turbine")
     # Curves of good integrators lie on each other; their errors do not.
     if any(_has(case, "reference_error") for case in cases):
         plots.append(_error_plot(cases))
     plots += [*_guard_plots(cases)[:1], *_more_plots(cases)][: 4 - len(plots)]
     rows = [rrb.Horizontal(*plots[i : i + 2]) for i in (0, 2)]
-    return rrb.Vertical(scene_view(cases), *rows, row_shares=[5, 3, 3], name="Turbines")
+    return rrb.Vertical(scene_view(cases), scales_view(), *rows, row_shares=[5, 1.2, 3, 3], name="Turbines")
 
 
 def _more_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
@@ -118,15 +133,9 @@ def _more_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
     return [rotor, torque] if len(cases) == 1 else [_wind_plot(cases), rotor]
 
 
-def _wind_plot(cases: Sequence[Viewed], live: bool = False) -> rrb.TimeSeriesView:
+def _wind_plot(cases: Sequence[Viewed]) -> rrb.TimeSeriesView:
     """The wind of the first case's blades, each at its own azimuth, and of the rotor; other integrators have the same wind."""
-    paths = [f"wind/{channel.name}" for channel in BLADE_WIND]
-    return _plot(
-        f"Wind at {SPAN:g} R of each blade, and over the rotor [m/s]",
-        cases[:1],
-        [*paths, "wind/wind_speed"],
-        live=live,
-    )
+    return _plot(_WIND, cases[:1], _WIND_PATHS)
 
 
 def scene_view(cases: Sequence[Viewed]) -> rrb.Spatial3DView:
@@ -148,14 +157,35 @@ def scene_view(cases: Sequence[Viewed]) -> rrb.Spatial3DView:
     )
 
 
-def _time_axis(cases: Sequence[Viewed], live: bool) -> rrb.TimeAxis:
-    """A short log whole, of a long one a minute around the cursor, of one that is being played the last seconds."""
-    last = max(float(case.log.time[-1]) for case in cases)
-    if last <= LONGEST_WHOLE and not live:
-        ends = [rr.TimeRangeBoundary.absolute(seconds=t) for t in (0.0, last)]
+def _whole(cases: Sequence[Viewed]) -> bool:
+    """Whether a plot shows all of the logs."""
+    return _last(cases) <= LONGEST_WHOLE
+
+
+def _last(cases: Sequence[Viewed]) -> float:
+    return max(float(case.log.time[-1]) for case in cases)
+
+
+def scales_view() -> rrb.Spatial2DView:
+    """What the colours of blades and wind mean."""
+    x, y = SCALE_BOUNDS
+    return rrb.Spatial2DView(
+        origin="scales",
+        name="Colours",
+        background=_BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=x, y_range=y),
+    )
+
+
+def _time_axis(cases: Sequence[Viewed], live: bool, room: float) -> rrb.TimeAxis:
+    """A short log whole, of a long one a minute around the cursor, of one that is being played the last seconds; room: share of the
+    width that stays free to the right of what is there, for the legend."""
+    if live:
+        ends = [rr.TimeRangeBoundary.cursor_relative(seconds=t) for t in (-30.0, 30.0 * room / (1 - room))]
+    elif _whole(cases):
+        ends = [rr.TimeRangeBoundary.absolute(seconds=t) for t in (0.0, _last(cases) / (1 - room))]
     else:
-        window = (-30.0, 2.0) if live else (-30.0, 30.0)
-        ends = [rr.TimeRangeBoundary.cursor_relative(seconds=t) for t in window]
+        ends = [rr.TimeRangeBoundary.cursor_relative(seconds=t) for t in (-30.0, 30.0)]
     return rrb.TimeAxis(view_range=rr.TimeRange(*ends))
 
 
@@ -163,17 +193,48 @@ def _plot(
     name: str,
     cases: Sequence[Viewed],
     paths: Sequence[str],
-    y: tuple[float, float] | None = None,
     live: bool = False,
+    width: float = 580.0,
 ) -> rrb.TimeSeriesView:
+    """Curves with a title. One needs no legend; that of several stands where no curve is: to the right of the log's end, or above the
+    curves where the log has no end on the screen. width: of the plot on a full screen [pixels]."""
+    labels = [_label(case, path, cases) for path in paths for case in cases]
+    several = len(labels) > 1
+    # curves below each other end at the same place, with a legend or without
+    letters = max(map(len, labels)) if live or len(cases) > 1 else max(len("discrepancy"), *map(len, labels))
+    room = 0.0 if live and not several else min(0.45, (42.0 + 7.0 * letters) / width)
+    top = 0.0 if live or _whole(cases) or not several else min(0.6, 0.125 * len(labels))
     return rrb.TimeSeriesView(
         origin="/",
         name=name,
         contents=[f"/plots/{path}/{case.key}" for path in paths for case in cases],
-        axis_x=_time_axis(cases, live),
-        axis_y=rrb.ScalarAxis(range=y) if y else None,
-        plot_legend=rrb.PlotLegend(visible=True, corner=rrb.Corner2D.RightTop),
+        axis_x=_time_axis(cases, live, room),
+        axis_y=_with_room_above(cases, paths, top),
+        plot_legend=rrb.PlotLegend(visible=several, corner=rrb.Corner2D.RightTop),
     )
+
+
+def _label(case: Viewed, path: str, cases: Sequence[Viewed]) -> str:
+    """As long as what the legend will say."""
+    channel = channels.BY_NAME.get(path.rpartition("/")[2])
+    return case.label if len(cases) > 1 else short_label(channel.label if channel else "blade 1")
+
+
+def _with_room_above(cases: Sequence[Viewed], paths: Sequence[str], share: float) -> rrb.ScalarAxis | None:
+    """The range of all curves with a share of the height free above them; None: as they are."""
+    if not share:
+        return None
+    known = []
+    for case in cases:
+        held = series(case, np.arange(len(case.log.time)))
+        held |= {f"solver/{name}": logarithm(getattr(case.log, name)) for name in SOLVER_SERIES}
+        found = [held[path] for path in paths if path in held]
+        known += [v[np.isfinite(v)] for v in found if np.isfinite(v).any()]
+    if not known:
+        return None
+    low, high = min(v.min() for v in known), max(v.max() for v in known)
+    edge = 0.04 * (high - low)
+    return rrb.ScalarAxis(range=(low - edge, high + edge + (high - low) * share / (1 - share)))
 
 
 def _blades(group: str, what: str, cases: Sequence[Viewed]) -> list[str]:
@@ -181,9 +242,9 @@ def _blades(group: str, what: str, cases: Sequence[Viewed]) -> list[str]:
     return [f"{group}/blade{i}_{what}" for i in ((1,) if len(cases) > 1 else (1, 2, 3))]
 
 
-def _solver_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
+def _solver_plots(cases: Sequence[Viewed]) -> list[rrb.View]:
     """Only those for which a case holds figures."""
-    plots = _guard_plots(cases)
+    plots: list[rrb.View] = _guard_plots(cases)
     if any(_has(case, "reference_error") for case in cases):
         plots.append(_error_plot(cases))
     holding = [case for case in cases if _has(case, "local_error")]
@@ -192,21 +253,20 @@ def _solver_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
     return plots
 
 
-def _guard_plots(cases: Sequence[Viewed]) -> list[rrb.TimeSeriesView]:
+def _guard_plots(cases: Sequence[Viewed]) -> list[rrb.View]:
     """Where the corrector was trusted, and by what margin, of the hybrid integrators."""
     guarded = [case for case in cases if case.is_guarded]
     if not guarded:
         return []
-    lowest, highest = band_lane(len(guarded) - 1)[0], band_lane(0)[1]
-    return [
-        _plot(
-            "Corrector trusted, or fallen back (below, red)",
-            guarded,
-            ["solver/accepted", "solver/fallen_back"],
-            (lowest - 0.5, highest + 0.5),
-        ),
-        _plot("log10 of discrepancy and threshold", guarded, ["solver/discrepancy", "solver/threshold"]),
-    ]
+    trust = rrb.StateTimelineView(
+        origin="/trust",
+        name="Corrector trusted, or fallen back",
+        contents=[f"/trust/{case.key}" for case in guarded],
+    )
+    return [trust, _plot(_MARGIN, guarded, ["solver/discrepancy", "solver/threshold"])]
+
+
+_MARGIN = "log10 of the corrector's discrepancy; it is trusted below the threshold"
 
 
 def _error_plot(cases: Sequence[Viewed]) -> rrb.TimeSeriesView:

@@ -2,39 +2,34 @@
 
 LOOK: JSON of `live.Look`; HANDLE: an open file in which the JSON of `live.Watched` stands once standard input says so.
 
-It only reads: records and logs of the run folder, as they grow. It runs when nothing else wants to, and ends by itself: when the run is
-over and all is sent or played, when the viewer is gone, or when sending has stood still for a while, which is how a stopped viewer
-shows.
-
-Even a process of the idle class costs those that work something: a worker that wakes up on its core waits for the next tick of the
-clock, milliseconds, where the kernel is a server's. So where all cores are busy, and the campaign is so short that opening a viewer
-would cost it more than a percent, the viewer opens with the program's end. Until then this process has loaded nothing and sleeps.
+It only reads: records and logs of the run folder, as they grow. It opens the viewer and loads all that it needs while the campaign is
+being read. Where the workers leave fewer than two cores idle, it takes no more of one than its share from then on, and the viewer counts
+less than a worker. It ends by itself: when the run is over and all is sent or played, when the viewer is gone, or when sending has stood
+still for a while, which is how a stopped viewer shows.
 """
 
 from __future__ import annotations
 
 import faulthandler
 import json
-import math
 import os
 import select
-import socket
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 from fatigue_runner.viewer import window
-from fatigue_runner.viewer.live import Look, Watched
-from fatigue_runner.viewer.priority import yield_to_others
+from fatigue_runner.viewer.live import BROKEN, NOT_OPENED, Look, Watched
+from fatigue_runner.viewer.priority import Allowance, leave_room, weigh
 
 LOOK_SECONDS = 0.05
-CONNECT_SECONDS = 30.0
-START_SECONDS = 900.0  # loading Rerun when nothing else wants to run can take minutes
-LONG_RUN = 60.0  # s; opening a viewer takes some 2 s of a core, and those that work lose a fifth of that
-UNKNOWN_RUN = 30.0  # s without a finished case after which a run counts as long
-REPORT_SECONDS = 20.0  # after the last case, for the report that is written then
-SPARE_CORES = 2  # beside the workers': one for the run's own process, one for the viewer
+BUSY_LOOK_SECONDS = 0.1  # where a core is shared
+CONNECT_SECONDS = 60.0  # for a viewer that we opened, on the busiest machine
+FIRST_SECONDS = 1.5  # of a core that the first picture may take at once
+FIRST_PICTURE_SECONDS = (
+    3.0  # after the first picture was sent, for the viewer to draw it as fast as any program
+)
+UNKNOWN_SECONDS = 20.0  # without a finished case, after which the viewer counts less all the same
 
 
 class Ear:
@@ -58,58 +53,9 @@ class Ear:
             self.listen()
 
 
-class Room:
-    """Whether the viewer may open now."""
-
-    def __init__(self, told: Watched, now: float) -> None:
-        self._records = Path(told.folder) / "cases.jsonl"
-        self._pending = sum(map(len, told.jobs))
-        self._before, self._began = self._lines(), now
-        self._over = math.inf
-        self.spare = cores() - told.workers >= SPARE_CORES
-
-    def is_there(self, now: float, over: bool, gone: bool) -> bool:
-        """Yes where cores are idle, where the program is gone, and where the run takes so long that opening a viewer hardly counts.
-
-        over: the cases have run.
-        """
-        if gone or self.spare:
-            return True
-        if over:
-            self._over = min(self._over, now)
-            return now - self._over >= REPORT_SECONDS
-        elapsed, done = now - self._began, self._lines() - self._before
-        if done <= 0:
-            return elapsed >= UNKNOWN_RUN
-        return elapsed * self._pending / done >= LONG_RUN
-
-    def _lines(self) -> int:
-        try:
-            return self._records.read_bytes().count(b"\n")
-        except OSError:
-            return 0
-
-
-def cores() -> int:
-    """How many this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def main(look: Look, handle: int) -> None:
-    """Watch as `look` says what stands in the file `handle`."""
-    yield_to_others()
+def main(look: Look, handle: int) -> int:
+    """Watch as `look` says what stands in the file `handle`; returns the exit code."""
     ear = Ear()
-    while not ear.told and not ear.gone:
-        ear.wait(60.0)
-    if not ear.told:  # the campaign was refused: there is nothing to look at
-        return
-    with os.fdopen(handle, encoding="utf-8") as file:
-        file.seek(0)
-        told = Watched(**json.load(file))
-    room = Room(told, time.monotonic())
-    while not look.at_once and not room.is_there(time.monotonic(), ear.over, ear.gone):
-        ear.wait(0.5)
-    heartbeat(START_SECONDS)
     port = look.port or window.free_port()
     process = None if look.port else _open_viewer(port, look.viewer)
     import rerun as rr
@@ -117,30 +63,63 @@ def main(look: Look, handle: int) -> None:
     from fatigue_runner.viewer.blueprint import live_screen
     from fatigue_runner.viewer.relay import Relay
 
+    while not ear.told and not ear.gone:
+        ear.wait(60.0)
+    if not ear.told:  # the campaign was refused: there is nothing to look at
+        if process is not None:
+            window.end(process)
+        return 0
+    with os.fdopen(handle, encoding="utf-8") as file:
+        file.seek(0)
+        told = Watched(**json.load(file))
     if not _answers(port, process, ear):
-        return
+        return 0 if process is None else NOT_OPENED
+    heartbeat(look.stall)
     recording = rr.RecordingStream("fatigue-runner-live")
     recording.connect_grpc(
-        f"rerun+http://{window.HOST}:{port}/proxy", default_blueprint=live_screen([], False)
+        f"rerun+http://{window.HOST}:{port}/proxy", default_blueprint=live_screen([], look.pace)
     )
-    relay = Relay(told, look, recording, lambda: heartbeat(look.stall), room.spare)
+    relay = Relay(told, look, recording, lambda: heartbeat(look.stall))
+    beside = Beside(look, told, process)
     looked = time.monotonic()
     while True:
         heartbeat(look.stall)
         now = time.monotonic()
         ear.listen()
-        if not relay.step(now, ear.over):
+        if (ear.over or beside.may_work(now, relay.shown_at)) and not relay.step(now, ear.over):
             break
         if now - looked > 1.0:
             looked = now
-            if not listens(port):
-                return
-        time.sleep(LOOK_SECONDS if ear.over or room.spare or look.pace else 4 * LOOK_SECONDS)
+            if not window.listens(port):
+                return 0
+        time.sleep(LOOK_SECONDS if ear.over or beside.spare else BUSY_LOOK_SECONDS)
     recording.flush(timeout_sec=look.stall / 2)
+    return 0
+
+
+class Beside:
+    """What may be taken beside the workers: everything where cores are idle, else half of the share here and half by a viewer that
+    was opened here; all of it here where the viewer is somebody else's."""
+
+    def __init__(self, look: Look, told: Watched, process: Any) -> None:
+        self.spare = leave_room(told.workers)
+        self._viewer, self._began = process, time.monotonic()
+        self._part = look.share if process is None else look.share / 2
+        self._allowance = Allowance(self._part, FIRST_SECONDS)
+
+    def may_work(self, now: float, shown_at: float | None) -> bool:
+        """Whether another look may be taken now; shown_at: when the first picture was sent."""
+        if self.spare:
+            return True
+        drawn = self._began + UNKNOWN_SECONDS if shown_at is None else shown_at + FIRST_PICTURE_SECONDS
+        if self._viewer is not None and now > drawn:
+            weigh(self._part, self._viewer.pid)
+            self._viewer = None
+        return self._allowance.wait(now, time.process_time()) <= 0.0
 
 
 def _open_viewer(port: int, arguments: list[str]) -> Any:
-    """A viewer that gives way to the run as this process does: what it starts inherits that."""
+    """A viewer in the session of the run, so that its priority counts beside the workers'."""
     return window.start_viewer("--port", str(port), *arguments, own_session=False)
 
 
@@ -155,31 +134,22 @@ def heartbeat(seconds: float) -> None:
 _NOWHERE = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
 
 
-def listens(port: int) -> bool:
-    """Whether somebody listens on a port of this machine."""
-    try:
-        with socket.create_connection((window.HOST, port), timeout=1.0):
-            return True
-    except OSError:
-        return False
-
-
 def _answers(port: int, process: Any, ear: Ear) -> bool:
-    """Wait for the viewer; False where there is none to wait for. One that we opened comes, however late."""
-    until = time.monotonic() + (CONNECT_SECONDS if process is None else START_SECONDS)
-    while time.monotonic() < until:
-        if listens(port):
-            return True
+    """Wait for the viewer; False where there is none to wait for: ours ended, or the run did before somebody opened another."""
+    until = time.monotonic() + CONNECT_SECONDS
+    while not window.listens(port):
         ear.listen()
-        if (ear.over or ear.gone) if process is None else process.poll() is not None:
+        ended = ear.over if process is None else process.poll() is not None or time.monotonic() > until
+        if ended:
             return False
         time.sleep(0.1)
-    return False
+    return True
 
 
 if __name__ == "__main__":
+    code = BROKEN
     try:
-        main(Look(**json.loads(sys.argv[1])), int(sys.argv[2]))
+        code = main(Look(**json.loads(sys.argv[1])), int(sys.argv[2]))
     finally:
         # Rerun waits for the viewer when the interpreter ends in the usual way.
-        os._exit(0)
+        os._exit(code)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import cycle
@@ -13,6 +14,9 @@ import numpy as np
 
 from fatigue_runner.channels import BY_NAME
 from fatigue_runner.naming import integrator_label
+from fatigue_runner.results.cells import format_percent
+from fatigue_runner.results.ranking import fatigue_columns
+from fatigue_runner.results.relevance import relevant_errors
 from fatigue_runner.viewer import colours
 
 CHART = (160.0, 90.0)  # width and height of the chart, in its own units
@@ -27,6 +31,10 @@ class Overview:
     jobs: Sequence[Sequence[str]] = ()
     workers: int = 1
     rows: dict[str, dict[str, Any]] = field(default_factory=dict)
+    worst: dict[str, float] = field(
+        default_factory=dict
+    )  # DEL error of each integrator, as the verdict counts it
+    trouble: str = ""  # why there is no turbine to show
     _read: int = 0
 
     def update(self) -> bool:
@@ -35,14 +43,20 @@ class Overview:
             with (self.folder / "cases.jsonl").open("rb") as file:
                 file.seek(0, 2)
                 if file.tell() < self._read:  # begun anew with --fresh
-                    self._read, self.rows = 0, {}
+                    self._read, self.rows, self.worst = 0, {}, {}
                 file.seek(self._read)
                 whole, newline, _ = file.read().rpartition(b"\n")
         except OSError:
             return False
         self._read += len(whole) + len(newline)
         found = [_row(line) for line in whole.split(b"\n") if line]
-        self.rows |= {row["case_id"]: row for row in found if row}
+        new = {row["case_id"]: row for row in found if row}
+        self.rows |= new
+        for row in new.values():
+            errors = relevant_errors(row, fatigue_columns([row])) if row.get("status") == "done" else {}
+            if errors:
+                name = integrator(row)
+                self.worst[name] = max(self.worst.get(name, 0.0), *map(abs, errors.values()))
         return bool(found)
 
     def counts(self) -> dict[str, int]:
@@ -57,13 +71,9 @@ class Overview:
 
     def figure(self) -> str | None:
         """The column that the chart shows: blade 1's flapwise DEL at the highest exponent up to 10, else the first DEL."""
-        names = [
-            name
-            for row in self.rows.values()
-            for name in row
-            if name.startswith("del_") and "error" not in name
-        ]
-        names = list(dict.fromkeys(names))
+        names = next(
+            (n for row in self.rows.values() if (n := [f"del_{s}" for *_, s in fatigue_columns([row])])), []
+        )
         flap = [name for name in names if name.startswith("del_blade1_root_flapwise_moment_m")]
         flap = [name for name in flap if float(name.rpartition("_m")[2]) <= 10] or flap
         return (
@@ -101,15 +111,17 @@ class Overview:
             "| integrator | cases | worst DEL error |",
             "|---|---|---|",
         ]
-        groups: dict[str, list[dict[str, Any]]] = {}
-        for row in self.rows.values():
-            groups.setdefault(integrator(row), []).append(row)
-        for name, rows in sorted(groups.items()):
-            errors = [
-                abs(v) for row in rows for k, v in row.items() if k.startswith("del_error_") and v is not None
+        cases = Counter(map(integrator, self.rows.values()))
+        for name, number in sorted(cases.items()):
+            error = format_percent(max(self.worst[name], 1e-5)) if name in self.worst else "–"
+            error = f"< {error}" if self.worst.get(name, 1.0) < 1e-5 else error
+            lines.append(f"| {name} | {number} | {error} |")
+        if self.worst:
+            lines += [
+                "",
+                "Over all loads, exponents and winds so far; of a load that is next to nothing, over the one that governs there.",
             ]
-            lines.append(f"| {name} | {len(rows)} | {f'{max(errors):.1e}' if errors else '–'} |")
-        return "\n".join(lines)
+        return "\n".join([*lines, "", self.trouble])
 
 
 def integrator(row: dict[str, Any]) -> str:

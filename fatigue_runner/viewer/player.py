@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,6 @@ import numpy as np
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.logbook import Log, LogTail
 from fatigue_runner.viewer.cases import Viewed, as_viewed
-
-_STATUS = ("accepted", "discrepancy", "threshold", "local_error", "reference_error")
 
 
 class Player:
@@ -24,6 +23,7 @@ class Player:
         self.viewed: Viewed | None = None
         self.sent = 0
         self.ended = False
+        self.trouble = ""
         self._tail: LogTail | None = None
         self._began = 0.0
 
@@ -63,10 +63,10 @@ class Player:
 
 def extended(log: Log, block: Log) -> Log:
     """`log` with the rows of the block that follows it."""
-    log.time = np.concatenate([log.time, block.time])
-    log.state = np.concatenate([log.state, block.state])
-    log.wind = np.concatenate([log.wind, block.wind])
-    log.loads = {name: np.concatenate([values, block.loads[name]]) for name, values in log.loads.items()}
-    for name in _STATUS:
-        setattr(log, name, np.concatenate([getattr(log, name), getattr(block, name)]))
+    for field in fields(log):
+        held, new = getattr(log, field.name), getattr(block, field.name)
+        if isinstance(held, np.ndarray):
+            setattr(log, field.name, np.concatenate([held, new]))
+        elif field.name in ("loads", "control"):
+            setattr(log, field.name, {name: np.concatenate([held[name], new[name]]) for name in held})
     return log

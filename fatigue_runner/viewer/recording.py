@@ -5,7 +5,7 @@ A recording is filled block by block (`Stage.send`), so that a whole log and a l
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +15,7 @@ import rerun as rr
 from fatigue_runner.viewer import colours, shapes, wind_scene
 from fatigue_runner.viewer.cases import Viewed
 from fatigue_runner.viewer.inflow import BLADE_WIND
-from fatigue_runner.viewer.styles import SOLVER_SERIES, read_unit, set_style
+from fatigue_runner.viewer.styles import FALLEN_BACK, SOLVER_SERIES, TRUSTED, read_unit, set_style
 
 TIMELINE = "time"
 FRAME_RATE = 20.0  # Hz, of the 3-D scene; series keep the log's rate
@@ -25,12 +25,17 @@ BAND_POINTS = 4000  # a band of more points looks the same and draws slower
 TOWER_LEVELS = 9
 BLOCK = 4096  # rows per message
 
+# Of a scale of colours and between two, in the units of their view.
+SCALE_WIDTH, SCALE_GAP = 80.0, 40.0
+SCALE_BOUNDS = ((-12.0, 2 * SCALE_WIDTH + SCALE_GAP + 12.0), (-14.0, 17.0))
+
 _WHITE, _GREY, _BLUE = (232, 236, 240), (150, 158, 168), (92, 104, 122)
 
 
 class Stage:
     """Cases on a recording. scale: times true deflection; series_rate [Hz]: of simulated time, at most so many points per
-    series, None for all. Ranges of colours are those of all cases together."""
+    series, None for all; only: paths of series below `plots/` without the case, None for all. Ranges of colours are those of all cases
+    together."""
 
     def __init__(
         self,
@@ -38,8 +43,10 @@ class Stage:
         cases: Sequence[Viewed],
         scale: float = 1.0,
         series_rate: float | None = None,
+        only: Collection[str] | None = None,
     ) -> None:
         self.recording, self.cases, self.scale, self.series_rate = recording, cases, scale, series_rate
+        self.only = only
         self.flap_range = _range([_flap(case) for case in cases])
         self.wind_range = _range([wind_scene.disc_wind(case, slice(None)) for case in cases])
 
@@ -97,42 +104,33 @@ class Stage:
         self._log(f"{root}/ground", rr.LineStrips3D(pads, colors=[_BLUE], radii=rr.Radius.ui_points(0.7)))
 
     def _legend(self) -> None:
-        """Scales of the two colours, standing beside the first turbine."""
-        case = self.cases[0]
-        for name, scale, (low, high), side, unit, factor in (
-            ("flap moment", colours.FLAP_SCALE, self.flap_range, 12.0, "MN·m", 1e-6),
-            ("wind", colours.WIND_SCALE, self.wind_range, 34.0, "m/s", 1.0),
+        """Scales of the two colours, side by side below the scene."""
+        for name, scale, (low, high), left, factor in (
+            ("blade root flapwise moment [MN·m]", colours.FLAP_SCALE, self.flap_range, 0.0, 1e-6),
+            ("wind at the disc and the blades [m/s]", colours.WIND_SCALE, self.wind_range, SCALE_WIDTH + SCALE_GAP, 1.0),
         ):  # fmt: skip
             if not np.isfinite([low, high]).all():
                 continue
-            wide = 1.0 + 0.5 * (len(self.cases) - 1)  # seen from farther away
-            x, y = 0.0, case.offset + case.geometry.radius + side * wide
-            z = np.linspace(6.0, 46.0, 21)
-            strips = [[[x, y, a], [x, y, b]] for a, b in pairwise(z)]
-            shade = colours.on_scale(np.arange(20), 0, 19, scale)
-            self._log(
-                f"scene/legend/{name.replace(' ', '_')}", rr.LineStrips3D(strips, colors=shade, radii=1.3)
+            path = "scales/" + name.split()[0]
+            x = left + np.linspace(0.0, SCALE_WIDTH, 41)
+            strips = [[[a, 0.0], [b, 0.0]] for a, b in pairwise(x)]
+            shade = colours.on_scale(np.arange(40), 0, 39, scale)
+            self._log(path, rr.LineStrips2D(strips, colors=shade, radii=1.6))
+            marks = [f"{value * factor:.3g}" for value in np.linspace(low, high, 3)]
+            spots = [[left + part * SCALE_WIDTH, 4.0] for part in (0.0, 0.5, 1.0)]
+            told = [[left + SCALE_WIDTH / 2, -13.0]]
+            texts = rr.Points2D(
+                [*told, *spots], labels=[name, *marks], radii=0.01, colors=[_GREY], show_labels=True
             )
-            marks = np.linspace(low, high, 3)
-            labels = [f"{value * factor:.3g} {unit}" for value in marks]
-            spots = [
-                [x, y + 9.0 * wide, 6.0],
-                [x, y + 9.0 * wide, 26.0],
-                [x, y + 9.0 * wide, 46.0],
-                [x, y, 54.0],
-            ]
-            self._log(
-                f"scene/legend/{name.replace(' ', '_')}/marks",
-                rr.Points3D(spots, radii=0.01, labels=[*labels, name], colors=[_GREY], show_labels=True),
-            )
+            self._log(f"{path}/marks", texts)
 
     def send(self, case: Viewed, start: int = 0, stop: int | None = None) -> None:
         """Rows start..stop of a case's log, in blocks."""
         stop = len(case.log.time) if stop is None else min(stop, len(case.log.time))
         for first in range(start, stop, BLOCK):
-            rows = slice(first, min(first + BLOCK, stop))
-            self._send_series(case, rows)
-            self._send_scene(case, rows)
+            last = min(first + BLOCK, stop)
+            self.send_series(case, first, last)
+            self.send_scene(case, first, last)
 
     def _frames(self, case: Viewed, rows: slice, rate: float, most: int) -> np.ndarray:
         """Rows of the slice that are frames of a slower clock: the same ones however the log is cut into blocks."""
@@ -147,7 +145,9 @@ class Stage:
             [c for group in columns for c in group],
         )
 
-    def _send_scene(self, case: Viewed, rows: slice) -> None:
+    def send_scene(self, case: Viewed, start: int, stop: int) -> None:
+        """What moves in the scene, of rows start..stop of a case's log."""
+        rows = slice(start, stop)
         frames = self._frames(case, rows, FRAME_RATE, MAX_FRAMES // len(self.cases))
         frames = frames[np.isfinite(case.log.state[frames][:, case.geometry.drawn]).all(axis=1)]
         if len(frames):
@@ -199,26 +199,14 @@ class Stage:
         tint = () if shade is None else rr.Mesh3D.columns(albedo_factor=shade)
         self._columns(path, time, surface, tint)
 
-    def _send_series(self, case: Viewed, rows: slice) -> None:
-        log, stride = case.log, _stride(case, self.series_rate)
-        index = np.arange(rows.start, rows.stop)
+    def send_series(self, case: Viewed, start: int, stop: int) -> None:
+        """The curves of rows start..stop of a case's log."""
+        stride = _stride(case, self.series_rate)
+        index = np.arange(start, stop)
         index = index[index % stride == 0]
-        time = log.time[index]
-        for place, channel in enumerate(log.states):
-            self._series(
-                f"plots/state/{channel.name}/{case.key}", time, log.state[index, place] * channel.scale
-            )
-        if len(log.wind):
-            for place, channel in enumerate(log.winds):
-                self._series(f"plots/wind/{channel.name}/{case.key}", time, log.wind[index, place])
-            for channel, values in zip(BLADE_WIND, wind_scene.wind_of_blades(case, index).T, strict=True):
-                self._series(f"plots/wind/{channel.name}/{case.key}", time, values)
-        for channel in log.control_signals:
-            values = log.control[channel.name][index] * channel.scale
-            self._series(f"plots/control/{channel.name}/{case.key}", time, values)
-        for name, values in log.loads.items():
-            self._series(f"plots/load/{name}/{case.key}", time, values[index] * read_unit(name)[1])
-        self._send_solver(case, rows, stride)
+        for path, values in series(case, index).items():
+            self._series(path, case, case.log.time[index], values)
+        self._send_solver(case, slice(start, stop), stride)
 
     def _send_solver(self, case: Viewed, rows: slice, stride: int) -> None:
         """What belongs to the interval that ends at a row; errors and norms by their logarithm, as they spread over decades.
@@ -235,30 +223,51 @@ class Stage:
             if len(values) != within.stop - within.start or not np.isfinite(values).any():
                 continue
             values = np.fmax.reduceat(values, starts)
-            known = np.isfinite(values) & (values > 0)
-            self._series(f"plots/solver/{name}/{case.key}", time[known], np.log10(values[known]))
+            values = logarithm(values)
+            known = np.isfinite(values)
+            self._series(f"solver/{name}", case, time[known], values[known])
         if case.is_guarded and len(log.accepted):
-            self._send_band(case, within)
+            self._send_trust(case, within)
 
-    def _send_band(self, case: Viewed, within: slice) -> None:
-        """One mark per group of steps in the case's lane, a lower one when any of them fell back."""
+    def _send_trust(self, case: Viewed, within: slice) -> None:
+        """Whether the corrector was trusted from one time of the log to the next; of many steps that a picture cannot tell apart it fell
+        back where any did."""
+        if not self._wanted("trust"):
+            return
         starts = _starts(within, max(1, int(np.ceil(len(case.log.accepted) / BAND_POINTS))))
-        time = case.log.time[within.start + 1 : within.stop + 1][starts]
         good = np.minimum.reduceat(case.log.accepted[within].astype(np.uint8), starts) > 0
-        lane = band_lane([other.key for other in self.cases if other.is_guarded].index(case.key))
-        for name, which, height in (("accepted", good, lane[1]), ("fallen_back", ~good, lane[0])):
-            self._series(
-                f"plots/solver/{name}/{case.key}", time[which], np.full(int(which.sum()), float(height))
-            )
+        before = None if within.start == 0 else bool(case.log.accepted[within.start - 1])
+        changes = np.flatnonzero(np.r_[good[0] != before, good[1:] != good[:-1]])
+        time = case.log.time[within.start : within.stop][starts][changes]
+        states: list[Any] = [TRUSTED if trusted else FALLEN_BACK for trusted in good[changes]]
+        if within.stop == len(case.log.time) - 1:  # nothing is known beyond the end
+            time, states = np.r_[time, case.log.time[-1]], [*states, None]
+        self._columns(f"trust/{case.key}", time, rr.StateChange.columns(state=states))
 
-    def _series(self, path: str, time: np.ndarray, values: np.ndarray) -> None:
-        if len(values):
-            self._columns(path, time, rr.Scalars.columns(scalars=np.asarray(values, float)))
+    def _wanted(self, path: str) -> bool:
+        return self.only is None or path in self.only
+
+    def _series(self, path: str, case: Viewed, time: np.ndarray, values: np.ndarray) -> None:
+        if len(values) and self._wanted(path):
+            scalars = rr.Scalars.columns(scalars=np.asarray(values, float))
+            self._columns(f"plots/{path}/{case.key}", time, scalars)
 
 
-def band_lane(number: int) -> tuple[float, float]:
-    """Heights of the marks (fallen back, accepted) of the n-th guarded case in the plot of acceptance, from the top."""
-    return -2.0 * number, 1.0 - 2.0 * number
+def series(case: Viewed, index: np.ndarray) -> dict[str, np.ndarray]:
+    """{path below `plots/`: values as a person reads them} of some rows of a log, all but the solver's."""
+    log = case.log
+    found = {f"state/{c.name}": log.state[index, place] * c.scale for place, c in enumerate(log.states)}
+    if len(log.wind):
+        found |= {f"wind/{c.name}": log.wind[index, place] for place, c in enumerate(log.winds)}
+        blades = wind_scene.wind_of_blades(case, index).T
+        found |= {f"wind/{c.name}": values for c, values in zip(BLADE_WIND, blades, strict=True)}
+    found |= {f"control/{c.name}": log.control[c.name][index] * c.scale for c in log.control_signals}
+    return found | {f"load/{name}": values[index] * read_unit(name)[1] for name, values in log.loads.items()}
+
+
+def logarithm(values: np.ndarray) -> np.ndarray:
+    """log10; NaN for what has none."""
+    return np.log10(np.where(values > 0, values, np.nan))
 
 
 def nanoseconds(time: np.ndarray) -> np.ndarray:

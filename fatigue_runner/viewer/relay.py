@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,7 +12,7 @@ from typing import Any
 import rerun as rr
 
 from fatigue_runner.errors import FatigueRunnerError
-from fatigue_runner.viewer.blueprint import live_screen
+from fatigue_runner.viewer.blueprint import live_screen, shown_live
 from fatigue_runner.viewer.cases import Viewed
 from fatigue_runner.viewer.live import Look, Watched
 from fatigue_runner.viewer.overview import CHART, Overview, chart
@@ -17,49 +20,54 @@ from fatigue_runner.viewer.player import Player
 from fatigue_runner.viewer.recording import Stage
 
 OVERVIEW_SECONDS = 0.5  # between two pictures of the campaign
+SERIES_SECONDS = 0.5  # between two pieces of the curves of a case that is played
+WHOLE_SECONDS = 0.5  # for which a log that has begun is waited for
 SERIES_RATE = 25.0  # rows per simulated second that are forwarded; `view` shows all
-BLOCK = 1024  # rows at a time
+BLOCK = 512  # rows at a time
 
 
 class Relay:
     """One look at a time at the run folder, and what is new of it to the viewer."""
 
-    def __init__(
-        self, told: Watched, look: Look, recording: Any, alive: Callable[[], Any], playing: bool = True
-    ) -> None:
-        """alive: called in the middle of long work; playing: whether the shown case moves while the campaign runs."""
-        self.look, self.recording, self._alive, self._playing = look, recording, alive, playing
-        self.folder = Path(told.folder)
+    def __init__(self, told: Watched, look: Look, recording: Any, alive: Callable[[], Any]) -> None:
+        """alive: called in the middle of long work."""
+        self.look, self.recording, self._alive = look, recording, alive
+        self.folder, self._since = Path(told.folder), told.since
         self.overview = Overview(self.folder, told.total, told.jobs, told.workers)
-        first = next((name for job in told.jobs for name in job), None)
-        known = {name for job in told.jobs for name in job}
-        logged = self._log_of(look.case) if look.case else None
-        name = look.case if look.case in known or (logged and logged.exists()) else first
-        self.player = Player(self._log_of(name), look.pace) if name else None
+        self._known = {name for job in told.jobs for name in job}
+        self.player: Player | None = None
+        if look.case and (look.case in self._known or self._log_of(look.case).exists()):
+            self.player = Player(self._log_of(look.case), look.pace)
         self.stage: Any = None
-        self._drawn = 0.0
+        self.shown_at: float | None = None
+        self._drawn = -math.inf
+        self._seen = -math.inf
+        self._curves = (0, -math.inf)  # rows of the curves that were sent, and when
 
     def _log_of(self, name: str) -> Path:
         return self.folder / "logs" / f"{name}.mcap"
 
+    def _first_log(self) -> Path | None:
+        """The first log of this run's cases; those of an earlier run may still be there."""
+        found = []
+        with contextlib.suppress(OSError):
+            for entry in os.scandir(self.folder / "logs"):
+                if entry.name.partition(".mcap")[0] in self._known:
+                    found.append((entry.stat().st_mtime, entry.name.removesuffix(".part")))
+        new = [name for time, name in found if time >= self._since - 1.0]
+        return self.folder / "logs" / min(new) if new else None
+
     def step(self, now: float, over: bool) -> bool:
-        """Send what is new; False when there is nothing left to come."""
+        """Send what is new, a piece at a time; False when there is nothing left to come."""
         if over or now - self._drawn > OVERVIEW_SECONDS:
-            if self.overview.update() or not self._drawn:
+            if self.overview.update() or self._drawn == -math.inf:
                 self._draw()
             self._drawn = now
+        if self.player is None and (path := self._first_log()) is not None:
+            self.player = Player(path, self.look.pace)
         if self.player is not None:
             self._play(self.player, now)
-            if over and not self._playing and self.player.viewed is not None:
-                self._playing = True
-                self._arrange(self.player.viewed)
         return not over or (self.player is not None and self.player.has_more)
-
-    def _arrange(self, viewed: Viewed) -> None:
-        """The screen with the shown case. A moving picture is drawn anew all the time, so it stands where no core is to spare."""
-        self.recording.send_blueprint(
-            live_screen([viewed], self.look.pace is not None, playing=self._playing)
-        )
 
     def _draw(self) -> None:
         text = self.overview.text()
@@ -96,18 +104,35 @@ class Relay:
     def _play(self, player: Player, now: float) -> None:
         try:
             begins = player.read(now)
-        except FatigueRunnerError:  # a log that was damaged or begun anew: what is shown stays
+        except FatigueRunnerError as error:  # a log that was damaged or begun anew: what is shown stays
             player.ended = True
+            if player.viewed is None:
+                self.overview.trouble = f"No turbine to show: {error}"
+                self._draw()
             return
         if player.viewed is None:
             return
         if begins:
-            self.stage = Stage(self.recording, [player.viewed], self.look.scale, SERIES_RATE)
-            self.stage.set_up()
-            self._arrange(player.viewed)
-        due = player.due(now)
-        while player.sent < due:
+            self._seen = now
+        if self.stage is None and not player.ended and now - self._seen < WHOLE_SECONDS:
+            return  # a log is written in one go: whole, it shows what its colours have to span
+        self._begin(player.viewed)
+        due = min(player.sent + BLOCK, player.due(now))
+        if player.sent < due:
             self._alive()
-            upto = min(player.sent + BLOCK, due)
-            self.stage.send(player.viewed, player.sent, upto)
-            player.sent = upto
+            self.stage.send_scene(player.viewed, player.sent, due)
+            player.sent = due
+            self.shown_at = self.shown_at or now
+        rows, sent = self._curves
+        if rows < player.sent and (
+            player.sent - rows >= BLOCK or now - sent >= SERIES_SECONDS or not player.has_more
+        ):
+            self.stage.send_series(player.viewed, rows, player.sent)
+            self._curves = (player.sent, now)
+
+    def _begin(self, viewed: Viewed) -> None:
+        if self.stage is not None:
+            return
+        self.stage = Stage(self.recording, [viewed], self.look.scale, SERIES_RATE, shown_live(viewed))
+        self.stage.set_up()
+        self.recording.send_blueprint(live_screen([viewed], self.look.pace))

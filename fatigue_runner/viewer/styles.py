@@ -9,6 +9,7 @@ from fatigue_runner.viewer import colours
 from fatigue_runner.viewer.cases import Viewed
 from fatigue_runner.viewer.inflow import BLADE_WIND
 
+TRUSTED, FALLEN_BACK = "trusted", "fallen back"
 SOLVER_SERIES = ("discrepancy", "threshold", "local_error", "reference_error")
 
 
@@ -30,7 +31,7 @@ def set_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> Non
         colour, name = case.colour, case.label
         # the wind at the blades is told of one case, the others have the same
         if not several or channel in BLADE_WIND:
-            name = channel.label
+            name = short_label(channel.label)
             colour = colours.BLADES[blade - 1] if blade else colours.INTEGRATORS[0]
         if group == "wind" and blade is None and not several:
             colour = _signal_colour(channel.name)
@@ -47,20 +48,17 @@ def set_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> Non
             static=True,
         )
     if case.is_guarded:
-        trusted = case.colour if several else colours.ACCEPTED
-        for name, what, alone, colour in (
-            ("accepted", "accepted", True, trusted), ("fallen_back", "fallen back", False, colours.REJECTED),
-        ):  # fmt: skip
-            recording.log(
-                f"plots/solver/{name}/{case.key}",
-                rr.SeriesPoints(
-                    names=_name(case, what, several, alone),
-                    colors=colour,
-                    markers="square",
-                    marker_sizes=7.0,
-                ),
-                static=True,
-            )
+        recording.log(
+            f"trust/{case.key}",
+            rr.StateConfiguration(values=[TRUSTED, FALLEN_BACK], colors=[colours.ACCEPTED, colours.REJECTED]),
+            static=True,
+        )
+
+
+def short_label(label: str) -> str:
+    """Of one of several series that share a plot with a title: `blade 1` of `blade 1 root flapwise moment`."""
+    blade = next((name for name in ("blade 1", "blade 2", "blade 3") if name in label), None)
+    return blade or label.replace("wind speed, mean over the rotor", "rotor mean")
 
 
 def _signal_colour(name: str) -> tuple[int, int, int]:

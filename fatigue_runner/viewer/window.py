@@ -208,6 +208,15 @@ def require_free(port: int) -> None:
             ) from None
 
 
+def listens(port: int) -> bool:
+    """Whether somebody listens on a port of this machine."""
+    try:
+        with socket.create_connection((HOST, port), timeout=1.0):
+            return True
+    except OSError:
+        return False
+
+
 def free_port() -> int:
     """A port of this machine on which nobody listens now."""
     with socket.socket() as probe:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -198,7 +199,7 @@ class TestWithRerun:
         rows = sent(write(tmp_path, rows=1201))  # 60 s at 20 Hz
         assert rows["plots/load/tower_base_fore_aft_moment"] == rows["plots/state/edge"] == 1201
         assert rows["plots/solver/discrepancy"] == 1200
-        assert (rows["plots/solver/accepted"], rows["plots/solver/fallen_back"]) == (800, 400)
+        assert rows["trust"] == 3, "trusted, then fallen back, then the log's end"
         assert rows["scene/blade1"] == rows["scene/hub"] == rows["scene/blade_wind"] == 301
         assert rows["plots/wind/blade2_wind"] == rows["plots/wind/wind_sin_2"] == 1201
 
@@ -207,7 +208,18 @@ class TestWithRerun:
         few = sent(write(tmp_path, rows=1201), series_rate=5.0)
         assert every["plots/load/rotor_thrust"] == 1201 and few["plots/load/rotor_thrust"] == 301
         assert few["plots/solver/discrepancy"] == 300
-        assert few["plots/solver/fallen_back"] == every["plots/solver/fallen_back"], "no rejection is lost"
+        assert few["trust"] == every["trust"] == 3, "no rejection is lost"
+
+    def test_live_view_forwards_the_curves_of_its_screen_and_no_others(self, tmp_path):
+        path = write(tmp_path, rows=101)
+        from fatigue_runner.viewer.blueprint import shown_live
+
+        rows = sent(path, only=shown_live(cases.read_cases([path])[0]))
+        plots = {name for name in rows if name.startswith("plots/")}
+        blades = {f"plots/load/blade{i}_root_flapwise_moment" for i in (1, 2, 3)}
+        winds = {f"plots/wind/blade{i}_wind" for i in (1, 2, 3)} | {"plots/wind/wind_speed"}
+        assert plots == blades | winds | {"plots/load/tower_base_fore_aft_moment"}
+        assert rows["scene/blade1"] == 101
 
     @given(st.lists(st.integers(0, 150), max_size=5).map(sorted))
     @settings(max_examples=6, deadline=None)
@@ -268,13 +280,13 @@ class Sent:
         self.blocks[path] = self.blocks.get(path, 0) + 1
 
 
-def sent(path: Path, cuts: tuple[int, ...] = (), series_rate: float | None = None) -> dict[str, int]:
+def sent(path: Path, cuts: tuple[int, ...] = (), **stage_of: Any) -> dict[str, int]:
     """Rows sent of a log, by entity without the case's key, when it is sent in pieces that end at `cuts`."""
     from fatigue_runner.viewer.recording import Stage
 
     viewed = cases.read_cases([path])
     counter = Sent()
-    stage = Stage(counter, viewed, series_rate=series_rate)
+    stage = Stage(counter, viewed, **stage_of)
     stage.set_up()
     for first, last in zip((0, *cuts), (*cuts, None), strict=True):
         stage.send(viewed[0], first, last)

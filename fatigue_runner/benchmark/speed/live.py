@@ -1,8 +1,8 @@
 """What it costs a campaign to be watched: the same campaign without and with `--live`, in turn, in one run.
 
 Both cores are busy all the time, which is the worst that can happen: what the bridge and the viewer take is taken from the workers.
-The bridge opens the viewer after a campaign that is as short as this one; with `at_once` it opens it as soon as the cases
-run, as in a campaign of minutes, and what that costs in seconds is what such a campaign loses.
+The viewer opens while the campaign is read and shows its first picture in the middle of it; a campaign of minutes loses a smaller
+share.
 
 In each round every situation runs once. Clocks are compared with the mean of the two unwatched runs of the same round; how far those
 two lie apart is the machine's own unrest, and on a shared one that is more than what is to be measured. So the verdict rests on what
@@ -31,7 +31,7 @@ from fatigue_runner.campaign import run_campaign
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.viewer import window
 from fatigue_runner.viewer.live import Look, Watcher
-from fatigue_runner.viewer.priority import yield_to_others
+from fatigue_runner.viewer.priority import cpu_of_group, processes, ticks_of_processes
 
 ALONE = "not watched"
 AGAIN = "not watched, again"
@@ -74,13 +74,12 @@ def measure(
     rounds: int = 5,
     duration: float = 120.0,
     workers: int | None = None,
-    at_once: bool = False,
     say: Callable[[str], Any] = lambda text: None,
 ) -> dict[str, Any]:
     """Wall time of the campaign in every situation of `SITUATIONS`, in turn.
 
     duration [s]: simulated, per case; workers: processes, default as many as cores. Returns {"cores", "workers", "rounds",
-    "at_once", "rerun", "viewer", "disturbed", "slower", "situations": {name: {"seconds", "waits": [...], "ratio", "lowest",
+    "rerun", "viewer", "disturbed", "slower", "situations": {name: {"seconds", "waits": [...], "ratio", "lowest",
     "highest", "waited", "slower", "cpu", "watching"}}}: ratio, waited [s], cpu [s] of the run's processes and the share of all cores
     that bridge and viewer took (watching) are medians over the rounds; slower is the waiting beyond that of unwatched runs over their
     wall time; disturbed counts runs that other programs disturbed at every try.
@@ -98,7 +97,7 @@ def measure(
     for number in range(rounds):
         # another order in each round: what ran just before must not always be the same
         for name in random.Random(number).sample(SITUATIONS, len(SITUATIONS)):
-            runs[name].append(_undisturbed(spec, name, Look(viewer=viewer, at_once=at_once), alone / 3))
+            runs[name].append(_undisturbed(spec, name, Look(viewer=viewer), alone / 3))
         say(f"round {number + 1}: " + ", ".join(f"{name} {runs[name][-1].wall:.2f} s" for name in SITUATIONS))
     base = [(a.wall + b.wall) / 2 for a, b in zip(runs[ALONE], runs[AGAIN], strict=True)]
     situations = {name: _figures(found, base, cores) for name, found in runs.items()}
@@ -110,7 +109,6 @@ def measure(
         "cores": cores,
         "workers": workers,
         "rounds": rounds,
-        "at_once": at_once,
         "rerun": version("rerun-sdk"),
         "viewer": {"--headless": "drawing, without a screen", "--serve-grpc": "server only"}.get(
             "".join(viewer), "window"
@@ -161,19 +159,21 @@ def _undisturbed(spec: dict[str, Any], name: str, look: Look, after: float) -> _
 def _run(spec: dict[str, Any], name: str, look: Look, after: float) -> _Run:
     """One run in one situation; after [s]: when something happens to the viewer."""
     with tempfile.TemporaryDirectory() as folder, _situation(name, look.viewer, after) as (port, groups):
-        own, all_before = os.getpgid(0), _ticks()
-        cpu, waited, begin = _cpu_of_group(own), _waited_of_group(own), time.perf_counter()
+        own, all_before = os.getpgid(0), ticks_of_processes()
+        cpu, waited, begin = _cpu(own), _waited_of_group(own), time.perf_counter()
         watcher = None
         if name.startswith("viewer"):
             watcher = Watcher(replace(look, port=port))
             if watcher.bridge is not None:
                 groups.append(watcher.bridge.process.pid)
-        before = sum(map(_cpu_of_group, groups))
+        before = sum(map(_cpu, groups))
         results = run_campaign(spec, Path(folder) / "run", watch=watcher)
         wall = time.perf_counter() - begin
-        used = sum(map(_cpu_of_group, groups)) - before
-        cpu, waited = _cpu_of_group(own) - cpu, _waited_of_group(own) - waited
-        outside = {pid: ticks for pid, (ticks, group) in _ticks().items() if group not in {own, *groups}}
+        used = sum(map(_cpu, groups)) - before
+        cpu, waited = _cpu(own) - cpu, _waited_of_group(own) - waited
+        outside = {
+            pid: ticks for pid, (ticks, group) in ticks_of_processes().items() if group not in {own, *groups}
+        }
         others = sum(ticks - all_before.get(pid, (0, 0))[0] for pid, ticks in outside.items())
         if watcher is not None and watcher.bridge is not None:
             watcher.__exit__(None, None, None)
@@ -192,7 +192,6 @@ def _situation(name: str, viewer: list[str], after: float) -> Iterator[tuple[int
         return
     port = window.free_port()
     with window.viewer(*viewer, "--port", str(port)) as process:
-        yield_to_others(process.pid)
         _wait_for(port)
         # a viewer of the user's own that begins to stand still, or is gone, in the middle of the run
         timer = threading.Timer(after, process.send_signal, [getattr(signal, _SIGNALS[name])])
@@ -223,27 +222,14 @@ def _end_group(process: Any) -> None:
     process.wait()
 
 
-def _processes() -> Iterator[tuple[Path, list[str]]]:
-    """Folder and status fields of every process; nothing where the system has no /proc."""
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            yield stat.parent, stat.read_text().rpartition(")")[2].split()
-
-
-def _ticks() -> dict[str, tuple[int, int]]:
-    """Ticks of CPU time and group of every process, by its number."""
-    return {folder.name: (int(f[11]) + int(f[12]), int(f[2])) for folder, f in _processes()}
-
-
-def _cpu_of_group(group: int) -> float:
-    """CPU time of a group's living processes [s]."""
-    return sum(ticks for ticks, own in _ticks().values() if own == group) / os.sysconf("SC_CLK_TCK")
+def _cpu(group: int) -> float:
+    return cpu_of_group(group) or 0.0
 
 
 def _waited_of_group(group: int) -> float:
     """Time for which the threads of a group's processes were ready to run and waited for a core [s]."""
     total = 0
-    for folder, fields in _processes():
+    for folder, fields in processes():
         if int(fields[2]) != group:
             continue
         with contextlib.suppress(OSError):
