@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         load_turbine,
         rainflow,
         run_campaign,
+        section_loads,
         simulate,
     )
 
@@ -51,6 +52,7 @@ __all__ = [
     "load_turbine",
     "rainflow",
     "run_campaign",
+    "section_loads",
     "simulate",
 ]
 

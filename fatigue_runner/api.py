@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,6 +48,7 @@ __all__ = [
     "load_turbine",
     "rainflow",
     "run_campaign",
+    "section_loads",
     "simulate",
 ]
 
@@ -117,6 +119,35 @@ def simulate(
             stacklevel=2,
         )
     return trajectory
+
+
+def section_loads(
+    turbine: Any,
+    trajectory: Trajectory,
+    tower_heights: Sequence[float] = (),
+    blade_radii: Sequence[float] = (),
+    root_directions: int = 0,
+    operation: str = "fixed",
+) -> dict[str, np.ndarray]:
+    """Bending moments [N m] of sections along tower and blade 1 in a trajectory, {channel: (n,)}.
+
+    turbine, operation: those of the trajectory, as for `simulate`; tower_heights [m] above the tower's foot: fore-aft and side-side;
+    blade_radii [m] from the rotor's apex: flapwise and edgewise; root_directions: moment of the blade's root by direction, as many over
+    half a circle. Of a trajectory or of a log that was read.
+    Raises InputError for a place off tower or blade, a turbine without blade elements, and another operation's trajectory.
+    """
+    from fatigue_runner.turbine.section_loads import SectionLoads
+
+    turbine = (load_turbine(turbine) if isinstance(turbine, str) else turbine).operated(operation)
+    names = [channel.name for channel in trajectory.states]
+    if names != list(turbine.layout.names):
+        raise InputError(
+            f"the trajectory is not one of turbine {turbine.name} with operation {operation!r}: it has {len(names)} states, "
+            f"that has {turbine.layout.size}; give the turbine and the operation that it was simulated with"
+        )
+    made = SectionLoads.of_turbine(turbine, tower_heights, blade_radii, root_directions)
+    loads = trajectory.loads
+    return made.of(turbine, trajectory.state, trajectory.wind, loads, loads["blade_pitch"], trajectory.winds)
 
 
 def correctors() -> list[Any]:

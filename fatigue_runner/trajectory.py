@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fatigue_runner.channels import STATES, Channel, wind_channels
+from fatigue_runner.channels import STATES, Channel, channel_name, wind_channels
+from fatigue_runner.errors import InputError, did_you_mean
 
 
 @dataclass
@@ -42,6 +43,16 @@ class Trajectory:
     pitch: np.ndarray = field(default_factory=lambda: np.empty(0))
     control: dict[str, np.ndarray] = field(default_factory=dict)
     control_signals: tuple[Channel, ...] = ()
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """(n,) of a state, load, wind signal or signal of the controller by its name, or by OpenFAST's (`RootMyb1`); raises InputError."""
+        there = dict(zip((c.name for c in self.states), self.state.T, strict=False))
+        there |= dict(zip((c.name for c in self.winds), self.wind.T, strict=False))
+        there |= {**self.control, **self.loads}
+        found = there.get(channel_name(name, there))
+        if found is None:
+            raise InputError(f"the trajectory has no channel {name!r}{did_you_mean(name, there)}")
+        return np.asarray(found)
 
     @property
     def winds(self) -> tuple[Channel, ...]:

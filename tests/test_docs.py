@@ -65,15 +65,32 @@ def test_every_key_of_every_type_of_wind_stands_on_its_page():
 
 
 def test_every_key_of_a_campaign_and_every_column_of_the_table_stand_on_their_page():
+    from fatigue_runner.campaign.loads_section import LoadsSection
     from fatigue_runner.campaign.spec import Campaign, Fatigue, IntegratorSection, Log
-    from fatigue_runner.channels import LOADS
     from fatigue_runner.results.columns import CASE
 
     told = set(re.findall(r"`([\w.]+)`", (DOCS / "campaign.md").read_text(encoding="utf-8")))
     keys = {*Campaign.model_fields, *IntegratorSection.model_fields}
     keys |= {f"fatigue.{key}" for key in Fatigue.model_fields} | {f"log.{key}" for key in Log.model_fields}
-    keys |= {column.name for column in CASE} | {channel.name for channel in LOADS}
+    keys |= {column.name for column in CASE} | {f"loads.{key}" for key in LoadsSection.model_fields}
     assert not keys - told, f"docs/campaign.md does not tell of {', '.join(sorted(keys - told))}"
+
+
+def test_the_page_of_channels_is_what_the_program_says():
+    from fatigue_runner.channels import LOADS, OPENFAST, STATES, WIND_SIGNALS, channel_name
+
+    page = (DOCS / "channels.md").read_text(encoding="utf-8")
+    names = {
+        c.name: [n for n, ours in OPENFAST.items() if ours == c.name]
+        for c in (*LOADS, *STATES, *WIND_SIGNALS)
+    }
+    named = [c for c in (*STATES, *WIND_SIGNALS) if names[c.name]]
+    rows = [
+        f"| `{c.name}` | {c.unit} | {c.label} | {', '.join(f'`{n}`' for n in names[c.name]) or '-'} |"
+        for c in (*LOADS, *named)
+    ]
+    assert re.findall(r"^\| `\w+` \| [^|]+ \| [^|]+ \| [^|]+ \|$", page, re.MULTILINE) == rows
+    assert all(channel_name(n.upper()) == c for c, found in names.items() for n in found)
 
 
 def test_the_logs_that_help_texts_name_are_those_of_the_quickstart():

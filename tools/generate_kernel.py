@@ -19,8 +19,10 @@ TARGET = ROOT / "fatigue_runner" / "turbine" / "generated"
 def generate() -> dict[Path, str]:
     """The generated modules by their paths."""
     from fatigue_runner.turbine.derivation.printer import VARIANTS, module
+    from fatigue_runner.turbine.derivation.section_printer import sections_module
 
-    return {TARGET / f"{name}.py": module(variant) for name, variant in VARIANTS.items()}
+    kernels = {TARGET / f"{name}.py": module(variant) for name, variant in VARIANTS.items()}
+    return kernels | {TARGET / "sections.py": sections_module()}
 
 
 def main() -> int:

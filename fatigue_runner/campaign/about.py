@@ -8,10 +8,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fatigue_runner._version import __version__
 from fatigue_runner.campaign.provenance import LIBRARIES
-from fatigue_runner.campaign.resolve import Resolved
+from fatigue_runner.campaign.resolve import HIGHEST_WIND_SPEED, Resolved
 from fatigue_runner.campaign.spec import IntegratorSection
+from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import to_yaml
 from fatigue_runner.inputs.source import Place
 from fatigue_runner.turbine.rated import rated_rotor_speed
@@ -40,6 +43,33 @@ def wind_words(resolved: Resolved) -> dict[str, list[str]]:
         "notes": [note for wind in resolved.winds for note in wind.notes],
     }
     return {what: list(dict.fromkeys(filter(None, words))) for what, words in said.items()}
+
+
+def operating_curve(resolved: Resolved) -> dict[str, list[float]]:
+    """What the turbine does under its controller in steady, uniform wind, at whole m/s over the campaign's winds: {channel: [SI]},
+    `wind_speed` among them; empty where nobody pitches.
+
+    Speed, pitch and power of the whole model's operating points, thrust of the rigid rotor there.
+    """
+    turbine = resolved.turbine
+    if not turbine.pitches:
+        return {}
+    speeds = [wind.source.mean_speed for wind in resolved.winds]
+    first, last = turbine.operating_wind or (3.0, HIGHEST_WIND_SPEED)
+    winds = np.arange(max(first, np.floor(min(speeds))), min(last, np.ceil(max(speeds))) + 0.5)
+    rows = []
+    for wind in winds:
+        try:
+            state = turbine.operating_point(float(wind))
+        except InputError:
+            continue  # a case in such a wind is refused elsewhere
+        commanded = {name: float(value) for name, value in turbine.commanded(state).items()}
+        speed = float(state[turbine.layout.rotor_speed])
+        torque, pitch = commanded["generator_torque"], commanded["pitch"]
+        power = turbine.generator_efficiency * torque * float(state[turbine.layout.generator_speed])
+        rows.append((float(wind), speed, pitch, power, float(turbine.rigid.thrust(wind, speed, pitch))))
+    names = ("wind_speed", "rotor_speed", "blade_pitch", "generator_power", "rotor_thrust")
+    return {name: [row[i] for row in rows] for i, name in enumerate(names)}
 
 
 def _processor() -> str:

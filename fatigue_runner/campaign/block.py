@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,11 +22,14 @@ from fatigue_runner.campaign.evaluate import (
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.pieces import leave
 from fatigue_runner.campaign.spec import Campaign
-from fatigue_runner.channels import Channel
+from fatigue_runner.channels import Channel, placed
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.fatigue.sections import Wall
 from fatigue_runner.results.columns import DESCRIPTION
 from fatigue_runner.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from fatigue_runner.turbine.section_loads import SectionLoads
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class Setup:
     metadata: dict[str, str] = field(default_factory=dict)  # of every log's `run` record
     attachments: dict[str, bytes] = field(default_factory=dict)
     walls: dict[str, Wall] = field(default_factory=dict)
+    sections: SectionLoads | None = None
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,7 @@ def run_block(job: Job) -> list[dict[str, Any]]:
             try:
                 if isinstance(outcome, Exception):
                     raise outcome
+                outcome = with_sections(job.setup, outcome)
                 own = evaluate(outcome, job.setup.campaign, job.setup.walls)
                 if integration.is_reference:
                     references[case.wind] = own if outcome.diverged_at is None else None
@@ -88,6 +94,17 @@ def run_block(job: Job) -> list[dict[str, Any]]:
                 records.append(record)
                 leave(job.setup.logs.parent, job.cases[0].id, record)
     return records
+
+
+def with_sections(setup: Setup, trajectory: Trajectory) -> Trajectory:
+    """With the loads of those sections that are asked for; a log may hold those of others."""
+    own = {name: values for name, values in trajectory.loads.items() if not placed(name)}
+    if setup.sections is not None:
+        turbine = _turbine(setup.turbine, setup.turbine_hash, setup.campaign.operation)
+        own |= setup.sections.of(
+            turbine, trajectory.state, trajectory.wind, own, own["blade_pitch"], trajectory.winds
+        )
+    return dataclasses.replace(trajectory, loads=own)
 
 
 def _by_integration(cases: Iterable[Case]) -> dict[Integration, list[Case]]:
@@ -186,6 +203,7 @@ def _finish(
         "wind_strength": wind.strength,
         "wind_left_out": wind.left_out,
         "wind_notes": " ".join(wind.notes),
+        "discard": f"{campaign.discard:g}",
         "corrector_hash": case.integration.digest or "",
         **{name: "" if row[name] is None else str(row[name]) for name in DESCRIPTION},
     }
@@ -203,7 +221,7 @@ def _finish(
         reference_error=error,
         compression=campaign.log.compression,
         topics=campaign.log.topics,
-        channels=campaign.log.channels,
+        channels=campaign.logged,
     )
     return _record(case, row, path.stat().st_size)
 

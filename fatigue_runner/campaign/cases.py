@@ -38,7 +38,9 @@ def make_cases(resolved: Resolved) -> list[Case]:
     """All cases of a campaign, wind by wind, the reference of a wind first."""
     campaign = resolved.campaign
     common = campaign.model_dump(include={"duration", "output_rate", "initial", "pitch"})
-    evaluation = campaign.model_dump(include={"fatigue", "discard"}) | {"log": campaign.log.model_dump()}
+    evaluation = campaign.model_dump(include={"fatigue", "discard", "loads"}) | {
+        "log": campaign.log.model_dump()
+    }
     evaluation["walls"] = {
         place: [wall.circle.diameter, wall.circle.wall] for place, wall in resolved.walls.items()
     }

@@ -13,7 +13,7 @@ import numpy as np
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.spec import Campaign
-from fatigue_runner.channels import Channel
+from fatigue_runner.channels import Channel, placed
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.fatigue.sections import Wall
 from fatigue_runner.layout import PITCH_RATE, PITCH_RATE_LIMITED
@@ -51,7 +51,9 @@ def discarded(trajectory: Trajectory, discard: float) -> Trajectory:
 def evaluate(
     trajectory: Trajectory, campaign: Campaign, walls: Mapping[str, Wall] = MappingProxyType({})
 ) -> Evaluated:
-    """Count every fatigue channel once, all exponents on the same cycles, and the walls of places; a diverged case has no loads."""
+    """Count every fatigue channel once, all exponents on the same cycles, and the walls of places; a diverged case has no loads, a
+    trajectory without the loads of sections none of those.
+    """
     from fatigue_runner.fatigue import count_channels
 
     finite = np.isfinite(trajectory.state).all(axis=1)
@@ -63,7 +65,7 @@ def evaluate(
         return Evaluated(trajectory, kept, {})
     fatigue = campaign.fatigue
     counted = count_channels(
-        {channel: kept.loads[channel] for channel in fatigue.channels},
+        {c: kept.loads[c] for c in campaign.counted if c in kept.loads or not placed(c)},
         fatigue.wohler_exponents,
         kept.duration,
         fatigue.residue,
@@ -136,7 +138,7 @@ def _statistics(trajectory: Trajectory) -> dict[str, Any]:
         "min_time": lambda values: time[np.argmin(values)],
         "max_time": lambda values: time[np.argmax(values)],
     }
-    keys = statistics_keys(trajectory.states)
+    keys = statistics_keys(trajectory.states, trajectory.loads)
     return {
         f"{name}_{channel}": functions[name](series[channel]) for name, channel in keys if channel in series
     }
@@ -165,7 +167,7 @@ def failed_row(
 def empty_row(case: Case, campaign: Campaign, states: Sequence[Channel]) -> dict[str, Any]:
     """Every column, with what is known of a case before it runs."""
     settings = campaign.fatigue
-    names = columns(settings.channels, settings.wohler_exponents, states, settings.angles)
+    names = columns(campaign.counted, settings.wohler_exponents, states, settings.angles)
     row: dict[str, Any] = dict.fromkeys(names)
     return row | {
         "case_id": case.id,
@@ -203,7 +205,7 @@ def _trained(integration: Integration) -> dict[str, float]:
 
 
 def _fatigue(campaign: Campaign) -> list[tuple[str, float, str]]:
-    return fatigue_keys(campaign.fatigue.channels, campaign.fatigue.wohler_exponents)
+    return fatigue_keys(campaign.counted, campaign.fatigue.wohler_exponents)
 
 
 def _costs(trajectory: Trajectory) -> dict[str, Any]:

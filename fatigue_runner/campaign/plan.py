@@ -60,7 +60,12 @@ class Plan:
             return 0.0
         layout = self.resolved.turbine.layout
         signals = max(len(wind.source.channels) for wind in self.resolved.winds)
-        topics = {"state": layout.size, "loads": len(LOADS), "status": STATUS_FIELDS, "wind": signals}
+        topics = {
+            "state": layout.size,
+            "loads": len(LOADS) + len(campaign.loads.channels),
+            "status": STATUS_FIELDS,
+            "wind": signals,
+        }
         fields = [count for name, count in topics.items() if name in (campaign.log.topics or topics)]
         chosen = len(campaign.log.channels or ()) or sum(fields)
         row = 9.0 * min(chosen, sum(fields)) + MESSAGE_BYTES * len(fields)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from fatigue_runner.integrators import Ensemble
     from fatigue_runner.integrators.pitch import PitchSeries
     from fatigue_runner.turbine import Turbine
+    from fatigue_runner.turbine.section_loads import SectionLoads
 
 # Above this the tip-speed ratio of a 5-MW-sized rotor leaves the aerodynamic tables for good.
 HIGHEST_WIND_SPEED = 40.0
@@ -51,6 +52,7 @@ class Resolved:
     integrations: list[Integration]  # the reference first
     winds: list[ResolvedWind]
     walls: dict[str, Wall] = field(default_factory=dict)  # of the places whose damage is counted
+    sections: SectionLoads | None = None  # what makes the loads of sections, where some are asked for
 
     @property
     def operating_wind(self) -> tuple[float, float] | None:
@@ -82,7 +84,16 @@ def resolve(campaign: Campaign, source: Source) -> Resolved:
     integrations = _integrations(campaign, source)
     winds = _winds(campaign, turbine, pitch, source)
     walls = _walls(campaign, turbine, source)
-    return Resolved(campaign, source, turbine, turbine_source, pitch, integrations, winds, walls)
+    sections = _sections(campaign, turbine, source)
+    return Resolved(campaign, source, turbine, turbine_source, pitch, integrations, winds, walls, sections)
+
+
+def _sections(campaign: Campaign, turbine: Turbine, source: Source) -> SectionLoads | None:
+    """What makes the loads of sections; refused off the tower and the blade."""
+    try:
+        return campaign.loads.of(turbine)
+    except InputError as error:
+        raise InputError(f"{source.where(('loads',))}: {error}") from None
 
 
 def _walls(campaign: Campaign, turbine: Turbine, source: Source) -> dict[str, Wall]:

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fatigue_runner.campaign.about import about, resolved_yaml, turbine_yaml, wind_words
+from fatigue_runner.campaign.about import about, operating_curve, resolved_yaml, turbine_yaml, wind_words
 from fatigue_runner.campaign.block import Job, Setup, run_block
 from fatigue_runner.campaign.pieces import followed
 from fatigue_runner.campaign.plan import Plan, make_plan
@@ -109,12 +109,14 @@ def _simulate(
         facts,
         {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan.resolved).encode()},
         plan.resolved.walls,
+        plan.resolved.sections,
     )
     about_run = {
         "cases": len(plan.cases),
         "facts": facts,
         "campaign": plan.campaign.model_dump(),
         "wind": wind_words(plan.resolved),
+        "operating_curve": operating_curve(plan.resolved),
     }
     store.open(about_run, text)
     try:
@@ -200,7 +202,10 @@ def _collect(plan: Plan, store: Store, simulated: int) -> Results:
     return Results(
         out=store.out,
         columns=columns(
-            fatigue.channels, fatigue.wohler_exponents, plan.resolved.turbine.layout.states, fatigue.angles
+            plan.campaign.counted,
+            fatigue.wohler_exponents,
+            plan.resolved.turbine.layout.states,
+            fatigue.angles,
         ),
         rows=rows,
         notes=beyond(rows, rated_rotor_speed(plan.resolved.turbine)),

@@ -26,6 +26,8 @@ fatigue.wohler_exponents  default [3, 4, 5, 10, 12]
 fatigue.residue           what the rainflow residue counts as: `half` (default, ASTM), `full`, `drop`
 fatigue.damage            list of {place, curve, ...}: Miner's sum around the wall of a section, see `campaign/damage_section.py`
 
+loads            more places than base and root: {tower_heights, blade_radii, root_directions}, see `campaign/loads_section.py`
+
 lifetime         the life that the cases stand for, from the site's wind: {climate, years, ...}, see `results/lifetime_section.py`
 
 log.enabled      one MCAP file per case in logs/ (default true)
@@ -57,7 +59,15 @@ from pydantic import (
 
 from fatigue_runner import shipped
 from fatigue_runner.campaign.damage_section import DamageSection
-from fatigue_runner.channels import BY_NAME, FATIGUE_CHANNELS, LOAD_NAMES, STATE_NAMES, channel_name
+from fatigue_runner.campaign.loads_section import LoadsSection
+from fatigue_runner.channels import (
+    BY_NAME,
+    FATIGUE_CHANNELS,
+    LOAD_NAMES,
+    STATE_NAMES,
+    channel_name,
+    of_section,
+)
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, problem, validated
 from fatigue_runner.inputs.source import Source, read_mapping
@@ -162,6 +172,8 @@ class Fatigue(Section):
     def _channels_exist(cls, channels: list[str]) -> list[str]:
         channels = [channel_name(name) for name in channels]
         for name in channels:
+            if of_section(name):
+                raise problem(f"{name!r} is counted where `loads` asks for its section; leave it out here")
             if name not in LOAD_NAMES:
                 raise problem(f"{name!r} is no load channel{did_you_mean(name, LOAD_NAMES)}")
         return list(dict.fromkeys(channels))
@@ -198,7 +210,7 @@ class Log(Section):
         known = dict.fromkeys((*BY_NAME, *signals_of_control()))
         channels = None if channels is None else [channel_name(name) for name in channels]
         for name in channels or ():
-            if name not in known:
+            if name not in known and not of_section(name):
                 raise problem(
                     f"{name!r} is no state, wind signal, load or signal of a controller{did_you_mean(name, known)}"
                 )
@@ -258,7 +270,19 @@ class Campaign(Section):
     reference: Annotated[Reference | None, BeforeValidator(_none_in_words)] = Reference()
     fatigue: Fatigue = Fatigue()
     log: Log = Log()
+    loads: LoadsSection = LoadsSection()
     lifetime: LifetimeSection | None = None
+
+    @property
+    def counted(self) -> list[str]:
+        """All channels whose cycles are counted: those of `fatigue`, and the sections of `loads`."""
+        return [*self.fatigue.channels, *(c.name for c in self.loads.channels)]
+
+    @property
+    def logged(self) -> list[str] | None:
+        """The channels that logs keep; None for all."""
+        there = [c.name for c in self.loads.channels]
+        return None if self.log.channels is None else [channel_name(n, there) for n in self.log.channels]
 
     @model_validator(mode="before")
     @classmethod
@@ -295,6 +319,16 @@ class Campaign(Section):
     def blade_pitch(self) -> float | PitchSeries:
         """The pitch [rad] as the integrators take it."""
         return self.pitch.series() if isinstance(self.pitch, Pitch) else math.radians(self.pitch)
+
+    @model_validator(mode="after")
+    def _logged_sections_are_there(self) -> Campaign:
+        there = [c.name for c in self.loads.channels]
+        if len(set(there)) < len(there):
+            raise problem("two places differ in digits that no name shows; remove one", key="loads")
+        for name in self.logged or ():
+            if of_section(name) and name not in there:
+                raise problem(f"{name!r} is a section that `loads` does not ask for; add it there", key="log")
+        return self
 
     @model_validator(mode="after")
     def _times_fit(self) -> Campaign:

@@ -92,7 +92,7 @@ def columns(
     rows = len(time)
     loads = {}
     for name, values in block.loads.items():
-        if name not in channels.LOAD_NAMES:
+        if name not in channels.LOAD_NAMES and not channels.placed(name):
             raise LogError(f"unknown load channel {name!r}{did_you_mean(name, channels.LOAD_NAMES)}")
         if np.shape(values) != (rows,):
             raise LogError(f"load {name} to log has shape {np.shape(values)}; it must be ({rows},)")
@@ -129,6 +129,7 @@ def topics_of(
                     f"cannot log channel {name!r}, the run does not have it{did_you_mean(name, there)}"
                 )
     own = {"state": run.states, "wind": run.winds, "control": run.control_signals}
+    sections = [channels.BY_NAME[name] for name in run.loads if channels.placed(name)]
     found = []
     for t in kept:
         if t.key not in available:
@@ -137,7 +138,8 @@ def topics_of(
         if names is not None and t.key != "status":
             fields &= set(names)
         if fields - {"time"}:
-            found.append((t.of(own[t.key]) if t.open else t).only(fields))
+            whole = t.with_sections(sections) if t.key == "loads" else t.of(own[t.key]) if t.key in own else t
+            found.append(whole.only(fields))
     if [t.key for t in found] == ["status"]:
         raise LogError(
             "cannot log the status alone: it has no row for the first time; add state, loads or wind"

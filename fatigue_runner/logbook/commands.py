@@ -99,9 +99,8 @@ def _is_told_elsewhere(key: str) -> bool:
     """Whether `info` shows an entry of a campaign's result in a table, or a summary of it (`nrmse_max`)."""
     if key.startswith(("del_", "damage_ratio_")) or key == "rows":
         return True
-    return (
-        key.partition("_")[0] in ("mean", "min", "max", "nrmse") and key.partition("_")[2] in channels.BY_NAME
-    )
+    figures = ("mean_", "min_time_", "max_time_", "min_", "max_", "std_", "nrmse_")
+    return any(key.startswith(f) and key.removeprefix(f) in channels.BY_NAME for f in figures)
 
 
 def _equivalent_loads_table(summary: LogSummary) -> Table:
@@ -155,14 +154,15 @@ def _print_acceptance(console: Console, summary: LogSummary) -> None:
 def _print_extremes(console: Console, summary: LogSummary, everything: bool) -> None:
     """Of every channel; the wind's harmonics, a dozen and more that say little alone, only where all is asked for."""
     shown = [e for e in summary.extremes if everything or e.name not in _HARMONICS]
-    console.print(_extremes_table(shown))
+    after = f" after the first {summary.discarded:g} s, which do not count" if summary.discarded else ""
+    console.print(_extremes_table(shown, f"extremes{after}"))
     left = len(summary.extremes) - len(shown)
     if left:
         console.print(f"and {left} amplitudes of the wind's azimuthal harmonics: `--all` shows them")
 
 
-def _extremes_table(extremes: Sequence[Extreme]) -> Table:
-    table = _table("extremes", "channel", "unit")
+def _extremes_table(extremes: Sequence[Extreme], title: str) -> Table:
+    table = _table(title, "channel", "unit")
     for heading in ("min", "at s", "mean", "max", "at s"):
         table.add_column(heading, justify="right")
     for e in extremes:

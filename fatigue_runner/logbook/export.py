@@ -47,6 +47,7 @@ def units_of(log: Log) -> dict[str, str]:
     known = {
         c.name: c.unit for c in (*channels.BY_NAME.values(), *log.states, *log.winds, *log.control_signals)
     }
+    known |= {name: channels.BY_NAME[name].unit for name in log.loads if name in channels.BY_NAME}
     return status | known
 
 
@@ -58,7 +59,7 @@ def choose(columns: Columns, patterns: Iterable[str] | None) -> Columns:
     patterns = list(columns) if patterns is None else list(patterns)
     chosen: Columns = {"time": columns["time"]}
     for pattern in patterns:
-        matching = [name for name in columns if fnmatchcase(name, channels.channel_name(pattern))]
+        matching = [name for name in columns if fnmatchcase(name, channels.channel_name(pattern, columns))]
         if not matching:
             raise LogError(f"no channel {pattern!r} in the log{did_you_mean(pattern, columns)}")
         chosen |= {name: columns[name] for name in matching}

@@ -2,9 +2,10 @@
 
 Numbers are for ever: `time` is 1, a channel is its position in `channels` plus 2, so channels are only ever
 added at the end of their list; the wind's azimuthal harmonics, of which a log has as many as its wind, count
-from 101 on. States of first order, of a controller say, follow those of the turbine: each log says by its schema
-which it has. A schema names the fields that the log holds and no others, since a proto3 reader shows a declared
-but absent double as 0.0, which nobody could tell from a measurement.
+from 101 on, loads of sections, of which it has those of its campaign, from 201 on. States of first order, of a
+controller say, follow those of the turbine: each log says by its schema which it has. A schema names the fields
+that the log holds and no others, since a proto3 reader shows a declared but absent double as 0.0, which nobody
+could tell from a measurement.
 """
 
 from __future__ import annotations
@@ -83,6 +84,11 @@ class Topic:
         """The same topic of these signals, which begin with its own and may end with the wind's harmonics."""
         return replace(self, fields=_fields(signals))
 
+    def with_sections(self, sections: Sequence[channels.Channel]) -> Topic:
+        """The same topic with the loads of sections behind its own."""
+        further = (Field(c.name, FIRST_SECTION + i, "double", c.unit) for i, c in enumerate(sections))
+        return replace(self, fields=(*self.fields, *further))
+
     def further(self, names: Iterable[str]) -> tuple[str, ...]:
         """Those of a log's columns of this topic that are the log's own, in their order."""
         return tuple(n for n in names if n not in self.field_names and not n.startswith("_"))
@@ -93,6 +99,7 @@ class Topic:
 _TIME = Field("time", 1, "double", "s")
 
 
+FIRST_SECTION = 201  # loads of sections, of which a log has those of its campaign
 # c_1, s_1, c_2, ...: beyond the numbers that further signals of the whole rotor may get
 FIRST_HARMONIC = 101
 
@@ -118,7 +125,7 @@ STATUS_FIELDS = (
 TOPICS: dict[str, Topic] = {
     "status": Topic("status", "/solver/status", "Status", 3, STATUS_FIELDS),
     "state": Topic("state", "/turbine/state", "State", 1, _fields(channels.STATES), open=True),
-    "loads": Topic("loads", "/turbine/loads", "Loads", 2, _fields(channels.LOADS)),
+    "loads": Topic("loads", "/turbine/loads", "Loads", 2, _fields(channels.LOADS), open=True),
     "wind": Topic(
         "wind", "/wind", "Wind", 4, _fields((*channels.WIND_SIGNALS, *channels.WIND_HARMONICS)), open=True
     ),

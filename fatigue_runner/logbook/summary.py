@@ -62,7 +62,8 @@ class LogSummary:
 
     acceptance_rate: of the intervals of a guarded run, None where nothing was guarded; rejections: the
     longest stretches first; rejected_wind, accepted_wind: 5 %, 50 % and 95 % quantiles of the wind speed
-    [m/s]; discrepancy: over the threshold; reference_error: against the reference, in ranges of the state.
+    [m/s]; discrepancy: over the threshold; reference_error: against the reference, in ranges of the state;
+    discarded: time at the start [s] that the extremes leave out.
     """
 
     path: Path
@@ -82,6 +83,7 @@ class LogSummary:
     accepted_wind: tuple[float, float, float] | None = None
     discrepancy: Peak | None = None
     reference_error: Peak | None = None
+    discarded: float = 0.0
     extremes: list[Extreme] = field(default_factory=list)
     equivalent_loads: list[EquivalentLoad] = field(default_factory=list)
 
@@ -104,15 +106,22 @@ def _extreme(name: str, unit: str, values: np.ndarray, time: np.ndarray) -> Extr
     )
 
 
+def discarded(log: Log) -> float:
+    """Time [s] at the start that its campaign leaves out; 0 where the log ends before it, or does not say."""
+    discard = number(log.run, "discard") or 0.0
+    return discard if len(log.time) and discard <= log.time[-1] else 0.0
+
+
 def extremes(log: Log) -> list[Extreme]:
-    """Extremes of every channel in the log, loads first; without the azimuths, which only grow."""
+    """Extremes of every channel in the time that counts, loads first; without the azimuths, which only grow."""
+    counts = log.time >= discarded(log) - 1e-9
     columns = dict(log.loads)
     columns |= dict(zip((c.name for c in log.states), log.state.T, strict=True)) if len(log.state) else {}
     columns |= dict(zip((c.name for c in log.winds), log.wind.T, strict=True)) if len(log.wind) else {}
     found = []
     for name, values in columns.items():
         unit = channels.BY_NAME[name].unit if name in channels.BY_NAME else log.units.get(name, "")
-        extreme = None if name in channels.GROWING else _extreme(name, unit, values, log.time)
+        extreme = None if name in channels.GROWING else _extreme(name, unit, values[counts], log.time[counts])
         if extreme is not None:
             found.append(extreme)
     return found
@@ -177,6 +186,7 @@ def summarise(path: str | os.PathLike[str]) -> LogSummary:
         attachments={name: len(data) for name, data in log.attachments.items()},
         complete=log.complete,
         lost=log.lost,
+        discarded=discarded(log),
         extremes=extremes(log),
         equivalent_loads=equivalent_loads(log.result),
     )

@@ -50,10 +50,14 @@ class Run:
         campaign: Mapping[str, Any],
         facts: Mapping[str, str] | None = None,
         wind: Mapping[str, list[str]] | None = None,
+        operating_curve: Mapping[str, list[float]] | None = None,
     ) -> None:
         self.folder = folder
         self._facts = facts or {}
         self._wind = wind or {}
+        self.operating_curve = (
+            operating_curve or {}
+        )  # steady operation: {channel: values over its `wind_speed`}
         self.rows = list(rows)
         self.campaign = campaign
         self.summaries = rank(self.rows)
@@ -180,20 +184,24 @@ def _planned(folder: Path) -> int | None:
     return found if isinstance(found, int) else None
 
 
-def _read_settings(folder: Path) -> tuple[Mapping[str, Any], Mapping[str, str], Mapping[str, list[str]]]:
-    """The resolved campaign, the facts (turbine, hash, versions, machine), and what is said of the winds; empty where unknown."""
+def _read_settings(
+    folder: Path,
+) -> tuple[Mapping[str, Any], Mapping[str, str], Mapping[str, list[str]], Mapping[str, list[float]]]:
+    """The resolved campaign, the facts (turbine, hash, versions, machine), what is said of the winds, steady operation; empty where
+    unknown."""
     try:
         stored = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        campaign, facts, wind = stored["campaign"], stored.get("facts", {}), stored.get("wind", {})
-        if all(isinstance(part, Mapping) for part in (campaign, facts, wind)):
-            return campaign, facts, wind
+        campaign = stored["campaign"]
+        facts, wind, curve = (stored.get(name, {}) for name in ("facts", "wind", "operating_curve"))
+        if all(isinstance(part, Mapping) for part in (campaign, facts, wind, curve)):
+            return campaign, facts, wind, curve
     except FileNotFoundError:
         pass
     except (OSError, ValueError, KeyError, TypeError):
         raise InputError(
             f"{folder / 'run.json'} cannot be read; run the campaign again into a new folder"
         ) from None
-    return _read_campaign(folder / "campaign.yaml"), {}, {}
+    return _read_campaign(folder / "campaign.yaml"), {}, {}, {}
 
 
 def _read_campaign(path: Path) -> Mapping[str, Any]:

@@ -6,11 +6,11 @@ what was simulated.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from fatigue_runner.channels import LOADS, STATES, Channel
+from fatigue_runner.channels import BY_NAME, LOADS, STATES, Channel, placed
 
 Kind = Literal["number", "whole", "truth", "text"]
 Group = Literal[
@@ -98,11 +98,14 @@ def damage_keys(angles: Mapping[str, Sequence[int]]) -> list[tuple[str, int, str
     ]
 
 
-def statistics_keys(states: Sequence[Channel] = STATES) -> list[tuple[str, str]]:
-    """(statistic, channel) of every column of a statistic."""
-    named = {state.name: state for state in states}
-    measured = [*LOADS, *(named[name] for name in _OF_STATES if name in named)]
-    return [(figure, channel.name) for channel in measured for figure in _STATISTICS]
+def statistics_keys(
+    states: Sequence[Channel] = STATES, channels: Iterable[str] = ()
+) -> list[tuple[str, str]]:
+    """(statistic, channel) of every column of a statistic; channels: among them are those loads of sections that there are."""
+    named = {state.name for state in states}
+    measured = [c.name for c in LOADS] + [name for name in _OF_STATES if name in named]
+    measured += [name for name in channels if placed(name)]
+    return [(figure, name) for name in measured for figure in _STATISTICS]
 
 
 def fatigue_keys(channels: Sequence[str], exponents: Sequence[float]) -> list[tuple[str, float, str]]:
@@ -125,7 +128,7 @@ def table(
 
     angles: the azimuths [deg] around each place whose wall is counted.
     """
-    loads = {load.name: load for load in LOADS}
+    loads = {load.name: load for load in LOADS} | {name: BY_NAME[name] for name in channels}
     measured = loads | {state.name: state for state in states}
     errors = [
         Column(f"nrmse_{state.name}", "accuracy", f"RMS error over the reference's range: {state.label}")
@@ -145,7 +148,7 @@ def table(
         )
         for place, angle, column in damage_keys(angles or {})
     ]
-    statistics = [_statistic(figure, measured[name]) for figure, name in statistics_keys(states)]
+    statistics = [_statistic(figure, measured[name]) for figure, name in statistics_keys(states, channels)]
     return [*CASE, *errors, *fatigue, *damage, *statistics]
 
 

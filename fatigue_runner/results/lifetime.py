@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from fatigue_runner.channels import BY_NAME
+from fatigue_runner.channels import BY_NAME, channel_name
 from fatigue_runner.errors import InputError
 from fatigue_runner.fatigue import Climate
 from fatigue_runner.fatigue.lifetime import (
@@ -34,7 +34,7 @@ from fatigue_runner.results.cells import Row, number, text
 from fatigue_runner.results.columns import WIND, Column
 from fatigue_runner.results.frames import to_arrow, to_pandas
 from fatigue_runner.results.lifetime_section import LifetimeSection, check_covered
-from fatigue_runner.results.ranking import fatigue_columns, integrator_key
+from fatigue_runner.results.ranking import fatigue_columns, integrator_key, section_columns
 
 _DAMAGE = re.compile(r"^damage_(?!ratio_)(?P<place>[a-z]\w*)_(?P<azimuth>\d{3})$")
 FEW_SEEDS = 2  # fewer in every bin leave nothing to draw from
@@ -134,13 +134,15 @@ class Figure:
 
 @dataclass(frozen=True, eq=False)
 class Life:
-    """A life: the winds' bins, a figure for every integrator, channel and exponent, and for every place and azimuth."""
+    """A life: the winds' bins, a figure for every integrator, channel and exponent, and for every place and azimuth; sections: as loads, of
+    places along tower and blade."""
 
     section: LifetimeSection
     climate: Climate
     bins: tuple[WindBin, ...]
     loads: tuple[Figure, ...]
     damages: tuple[Figure, ...]
+    sections: tuple[Figure, ...] = ()
 
     @property
     def covered(self) -> float:
@@ -164,9 +166,15 @@ class Life:
         return tuple(sorted(keys, key=lambda key: not key[-1]))
 
     def load(self, integrator: Key, channel: str, m: float) -> Figure | None:
-        """The lifetime load of a channel and exponent; None where it was not counted."""
+        """The lifetime load of a channel and exponent, by its own or by OpenFAST's name; None where it was not counted."""
+        channel = channel_name(channel, (f.name for f in self.sections))
         return next(
-            (f for f in self.loads if (f.integrator, f.name, f.at) == (integrator, channel, float(m))), None
+            (
+                f
+                for f in (*self.loads, *self.sections)
+                if (f.integrator, f.name, f.at) == (integrator, channel, float(m))
+            ),
+            None,
         )
 
     def around(self, integrator: Key, place: str) -> list[Figure]:
@@ -212,7 +220,7 @@ class Life:
                 "lifetime_del_low": f.low, "lifetime_del_high": f.high, "error": f.error,
                 "unit": BY_NAME[f.name].unit if f.name in BY_NAME else "", **self._cover(f),
             }
-            for f in self.loads
+            for f in (*self.loads, *self.sections)
         ]  # fmt: skip
 
     def damage_rows(self) -> list[dict[str, Any]]:
@@ -305,7 +313,10 @@ def life_of(
         if number(row, "wind_speed") is not None:
             groups.setdefault(integrator_key(row), {})[_wind(row)] = row
     reference = next((rows for key, rows in groups.items() if key[-1]), None)
-    quantities = [(channel, m, f"del_{suffix}", m) for channel, m, suffix in fatigue_columns(table)]
+    quantities, sections = (
+        [(channel, m, f"del_{suffix}", m) for channel, m, suffix in columns]
+        for columns in (fatigue_columns(table), section_columns(table))
+    )
     damages = [(place, at, column, 1.0) for place, at, column in damage_columns(table)]
     made = [
         [
@@ -313,7 +324,7 @@ def life_of(
             for key, group in groups.items()
             for quantity in kind
         ]
-        for kind in (quantities, damages)
+        for kind in (quantities, damages, sections)
     ]
     shown = bins.probabilities(climate)
     return Life(
@@ -325,6 +336,7 @@ def life_of(
         ),
         tuple(made[0]),
         tuple(made[1]),
+        tuple(made[2]),
     )
 
 

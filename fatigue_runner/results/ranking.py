@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
-from fatigue_runner.channels import BY_NAME
+from fatigue_runner.channels import BY_NAME, placed
 from fatigue_runner.naming import integrator_label
 from fatigue_runner.results.cells import (
     Row,
@@ -110,7 +110,16 @@ def integrator_key(row: Row) -> tuple[str, float | None, str, str, bool]:
 
 
 def fatigue_columns(rows: Sequence[Row]) -> list[tuple[str, float, str]]:
-    """(channel, exponent, suffix) of every DEL that the table has, in the order of its columns."""
+    """(channel, exponent, suffix) of every DEL that the verdict rests on, in the order of the table's columns."""
+    return [found for found in _del_columns(rows) if not placed(found[0])]
+
+
+def section_columns(rows: Sequence[Row]) -> list[tuple[str, float, str]]:
+    """The same of the loads of sections, which say where a beam wears; the verdict does not rest on them."""
+    return [found for found in _del_columns(rows) if placed(found[0])]
+
+
+def _del_columns(rows: Sequence[Row]) -> list[tuple[str, float, str]]:
     names = dict.fromkeys(str(column) for row in rows for column in row)
     found = (m for m in map(_DEL.match, names) if m is not None)
     return [(m["channel"], float(m["exponent"]), f"{m['channel']}_m{m['exponent']}") for m in found]

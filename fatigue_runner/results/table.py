@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fatigue_runner.channels import channel_name
 from fatigue_runner.encoded import decoded
-from fatigue_runner.errors import InputError
+from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.results.columns import NEEDED, kind_of
 from fatigue_runner.results.frames import to_arrow, to_pandas
@@ -55,7 +56,11 @@ class Results:
         return iter(self.rows)
 
     def column(self, name: str) -> list[Any]:
-        """One column, in row order."""
+        """One column, in row order; channels by their own or by OpenFAST's names: `del_RootMyb1_m10`. Raises InputError."""
+        if name not in self.columns:
+            name = "_".join(channel_name(part) for part in name.split("_"))
+        if name not in self.columns:
+            raise InputError(f"the results have no column {name!r}{did_you_mean(name, self.columns)}")
         return [row[name] for row in self.rows]
 
     def where(self, **conditions: Any) -> list[dict[str, Any]]:

@@ -47,7 +47,7 @@ def lifetime(results: Any, climate: Any = None, **keys: Any) -> ToldLife:
             'a life needs a climate: lifetime(results, climate="II"), or a campaign with `lifetime`'
         )
     life = life_of(rows, validated(LifetimeSection, Source("lifetime", given, what="lifetime")))
-    return ToldLife(life.section, life.climate, life.bins, life.loads, life.damages)
+    return ToldLife(life.section, life.climate, life.bins, life.loads, life.damages, life.sections)
 
 
 def _section_of(folder: Path) -> dict[str, Any]:

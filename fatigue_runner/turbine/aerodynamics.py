@@ -17,7 +17,7 @@ in the loads. Two choices make the loads smooth, so that splines through their t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -96,9 +96,7 @@ def blade_aerodynamics(
                 f"aerodynamics: stations: no polar of airfoil {name!r}{did_you_mean(name, polars)}"
             )
     grid = modes.grid
-    carried = np.column_stack([np.ones_like(grid), grid, modes.flap, modes.edge])
-    steps = np.gradient(grid) * np.where((grid == grid[0]) | (grid == grid[-1]), 0.5, 1.0)  # trapezoids
-    hats = np.stack([np.interp(grid, radius, unit) for unit in np.eye(len(radius))[1:-1]])
+    hats = _hats(grid, radius)
     inner = slice(1, -1)
     lift, drag = zip(*(polars[name] for name in stations["airfoil"][inner]), strict=True)
     straight = np.zeros_like(span)
@@ -125,12 +123,42 @@ def blade_aerodynamics(
         drag=drag,
         shapes=np.concatenate([modes.flap_at(radius[inner]), modes.edge_at(radius[inner])], axis=1),
         # along the bent blade, not along its axis
-        weights=(hats * steps @ carried).T * np.hypot(1.0, np.gradient(prebend, span))[inner],
+        weights=(hats * _steps(grid) @ _carried(modes)).T * np.hypot(1.0, np.gradient(prebend, span))[inner],
         prebend=prebend[inner],
         sweep=sweep[inner],
         cant=cant[inner],
         bent=bool(deflection) or any(name in stations for name in ("prebend", "cant_deg")),
     )
+
+
+def _hats(grid: Array, radius: Array) -> Array:
+    """(n, m) loads on the grid that are 1 at one inner station and 0 at the others."""
+    return np.stack([np.interp(grid, radius, unit) for unit in np.eye(len(radius))[1:-1]])
+
+
+def _steps(grid: Array) -> Array:
+    """Weights of the trapezoids."""
+    return np.gradient(grid) * np.where((grid == grid[0]) | (grid == grid[-1]), 0.5, 1.0)
+
+
+def _carried(modes: BladeModes) -> Array:
+    """(m, 6) what a load on the grid is multiplied with."""
+    grid = modes.grid
+    return np.column_stack([np.ones_like(grid), grid, modes.flap, modes.edge])
+
+
+def weights_beyond(blade: BladeAerodynamics, modes: BladeModes, radius: float) -> Array:
+    """`blade.weights` of the part beyond r = `radius` [m]; those of the whole blade at its root."""
+    grid = modes.grid
+    hats = _hats(grid, np.array([grid[0], *blade.radius, grid[-1]]))
+    inside = np.clip((radius - grid[:-1]) / np.diff(grid), 0.0, 1.0)  # share of every step that is not beyond
+    values = hats[:, :, None] * _carried(modes)
+    slopes = np.diff(values, axis=1)
+    first = values[:, :-1]
+    area = (first * inside[:, None] + slopes * (inside**2 / 2)[:, None]) * np.diff(grid)[:, None]
+    whole = np.sum(values * _steps(grid)[:, None], axis=1)
+    stretch = blade.weights[0] / whole[:, 0]  # along the bent blade
+    return ((whole - area.sum(axis=1)) * stretch[:, None]).T
 
 
 def rotor_loads(
@@ -150,27 +178,48 @@ def rotor_loads(
     turns the modes. skew: in-plane wind along the blade, by V: the wake leans that way and the blade sees more of
     it (`_skewed`). Torque and bending are moments about the apex; flap and edge are generalised forces of the modes.
     """
-    arguments = [np.asarray(v, dtype=float) for v in (tip_speed_ratio, pitch, kappa, y, flap, edge, skew)]
+    flow = {"kappa": kappa, "y": y, "flap": flap, "edge": edge, "skew": skew}
+    return loads_beyond(blade, (blade.weights,), tip_speed_ratio, pitch, **flow)[0]
+
+
+def loads_beyond(
+    blade: BladeAerodynamics,
+    weights: Sequence[Array],
+    tip_speed_ratio: ArrayLike,
+    pitch: ArrayLike,
+    **flow: ArrayLike,
+) -> Array:
+    """`rotor_loads` of parts of the blade, (k, 6, ...), by their k `weights`; flow: kappa, y, flap, edge, skew."""
+    given = (tip_speed_ratio, pitch, *(flow.get(name, 0.0) for name in STEPS))
+    arguments = [np.asarray(v, dtype=float) for v in given]
     shape = np.broadcast_shapes(*(v.shape for v in arguments))
     arguments = [np.broadcast_to(v, shape).reshape(-1, 1) for v in arguments]
     normal, driving = strip_loads(blade, *arguments)
+    found = [_resultants(blade, part, arguments[1][:, 0], normal, driving) for part in weights]
+    return np.stack(found).reshape(len(weights), len(LOAD_NAMES), *shape)
+
+
+def _resultants(
+    blade: BladeAerodynamics, weights: Array, theta: Array, normal: Array, driving: Array
+) -> Array:
+    """LOAD_NAMES (6, m) of the loads per length (m, n) on the part of the blade that `weights` are of."""
     # A canted section presses along the blade, too: the force that turns and pushes the rotor as the whole of it does.
     cant, lean, whole = np.cos(blade.cant), np.sin(blade.cant), blade.cone + blade.cant
-    pushing = (normal * (np.cos(whole) / np.cos(blade.cone))) @ blade.weights[0] if blade.bent else None
-    n, t = ((normal * cant) @ blade.weights.T).T, (driving @ blade.weights.T).T
+    pushing = (normal * (np.cos(whole) / np.cos(blade.cone))) @ weights[0] if blade.bent else None
+    n, t = ((normal * cant) @ weights.T).T, (driving @ weights.T).T
     turning = driving * (blade.prebend * np.tan(blade.cone)) + normal * blade.sweep * np.sin(whole) / np.cos(
         blade.cone
     )
-    theta = arguments[1][:, 0]
     c, s = np.cos(theta), np.sin(theta)
-    loads = [
-        n[0] if pushing is None else pushing,
-        t[0],
-        (t[1] - turning @ blade.weights[0]) / blade.rotor_radius,
-        (n[1] + (normal * lean * blade.prebend) @ blade.weights[0]) / blade.rotor_radius,
-        *((c * n[i] + s * n[i + 1]) - (c * t[i + 1] - s * t[i]) for i in (2, 4)),
-    ]
-    return np.stack(loads).reshape(len(LOAD_NAMES), *shape)
+    return np.stack(
+        [
+            n[0] if pushing is None else pushing,
+            t[0],
+            (t[1] - turning @ weights[0]) / blade.rotor_radius,
+            (n[1] + (normal * lean * blade.prebend) @ weights[0]) / blade.rotor_radius,
+            *((c * n[i] + s * n[i + 1]) - (c * t[i + 1] - s * t[i]) for i in (2, 4)),
+        ]
+    )
 
 
 def strip_loads(

@@ -78,6 +78,14 @@ class BladeModes:
     flap_slope: Array
     edge_slope: Array
     shortening: Array  # (n, 3) S_ff, S_fe, S_ee
+    elements: tuple[Array, Array]  # (k,) masses [kg], (k, 9) INTEGRAND_NAMES at their middles
+
+    def beyond(self, radius: float) -> Array:
+        """`integrals` over the part of the blade beyond r = `radius` [m], element by element."""
+        masses, a = self.elements
+        outer = a[:, INTEGRAND_NAMES.index("r")] > radius
+        found = np.einsum("n,ni,nj->ij", masses[outer], a[outer], a[outer])
+        return (found + found.T) / 2
 
     @property
     def mass(self) -> float:
@@ -170,6 +178,7 @@ def blade_modes(parameters: Mapping[str, Any]) -> BladeModes:
         flap_slope=slope["flap"],
         edge_slope=slope["edge"],
         shortening=shortening,
+        elements=(masses, a),
         **{f"{name}_{key}": value for name, mode in single.items() for key, value in mode.items()},
     )
 
@@ -200,6 +209,12 @@ class TowerMode:
         """phi(z), 1 at the top; height [m] above the tower base."""
         return self.polynomial(np.asarray(height) / self.length)
 
+    def shortening_at(self, height: float) -> float:
+        """S(z) [1/m]; height [m] above the tower base."""
+        x = np.linspace(0.0, height / self.length, _FINE_POINTS)
+        slope = self.polynomial.deriv()(x) / self.length
+        return float(np.trapezoid(slope**2, x * self.length))
+
     def slope_at(self, height: Array) -> Array:
         """phi'(z) [1/m]; height [m] above the tower base."""
         return self.polynomial.deriv()(np.asarray(height) / self.length) / self.length
@@ -214,6 +229,7 @@ class TowerModes:
     first_moment: float
     fore_aft: TowerMode
     side_side: TowerMode
+    elements: tuple[Array, Array]  # (k,) heights of the middles [m], masses [kg]
 
 
 def tower_modes(parameters: Mapping[str, Any]) -> TowerModes:
@@ -227,7 +243,9 @@ def tower_modes(parameters: Mapping[str, Any]) -> TowerModes:
     lumped = _lumped(elements, length, stations, "height_fraction", tower["mass_factor"])
     modes = {name: _tower_mode(tower, name, length, stations, lumped) for name in ("fore_aft", "side_side")}
     nodes, masses = lumped
-    return TowerModes(length=length, mass=float(masses.sum()), first_moment=float(masses @ nodes), **modes)
+    return TowerModes(
+        length=length, mass=float(masses.sum()), first_moment=float(masses @ nodes), elements=lumped, **modes
+    )
 
 
 def _tower_mode(

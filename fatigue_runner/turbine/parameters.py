@@ -82,10 +82,14 @@ def checked(values: Mapping[str, float]) -> dict[str, float]:
     return {name: float(values[name]) for name in PARAMETERS}
 
 
-def _blade(blade: BladeModes) -> dict[str, float]:
+def blade_integrals(integrals: Any) -> dict[str, float]:
+    """`equations.BLADE_INTEGRALS` of a blade, or of the part of it that `BladeModes.beyond` gives."""
     place = {name: i for i, name in enumerate(INTEGRAND_NAMES)}
-    out = {name: float(blade.integrals[place[a], place[b]]) for name, (a, b) in _INTEGRALS.items()}
-    return out | {
+    return {name: float(integrals[place[a], place[b]]) for name, (a, b) in _INTEGRALS.items()}
+
+
+def _blade(blade: BladeModes) -> dict[str, float]:
+    return blade_integrals(blade.integrals) | {
         "b_kf": blade.flap_stiffness, "b_ke": blade.edge_stiffness, "b_kfe": 0.0,
         "b_df": blade.flap_damping, "b_de": blade.edge_damping, "b_root": blade.hub_radius,
         "b_tip_fx": blade.flap_tip[0], "b_tip_fy": blade.flap_tip[1],

@@ -30,15 +30,30 @@ class RigidRotor:
 
     @cached_property
     def _torque(self) -> Any:
+        return self._spline("torque")
+
+    @cached_property
+    def _thrust(self) -> Any:
+        return self._spline("thrust")
+
+    def _spline(self, load: str) -> Any:
+        """Over tip-speed ratio and pitch; None where there is one pitch only."""
         from scipy.interpolate import RectBivariateSpline
 
         pitches = len(self.tables.pitch)
         if pitches == 1:
             return None
-        values = self.tables.coefficients["torque"] * self.parameters["cos_cone"]
+        values = self.tables.coefficients[load] * self.parameters["cos_cone"]
         return RectBivariateSpline(
             self.tables.tip_speed_ratio, self.tables.pitch, values, kx=3, ky=min(3, pitches - 1)
         )
+
+    def _coefficient(self, load: str, ratio: Array, pitch: Any) -> Array:
+        spline = {"torque": self._torque, "thrust": self._thrust}[load]
+        if spline is None:
+            values = self.tables.coefficients[load][:, 0] * self.parameters["cos_cone"]
+            return np.interp(ratio, self.tables.tip_speed_ratio, values)
+        return np.asarray(spline.ev(ratio, pitch))
 
     def _blown(self, wind: Any, speed: Any) -> tuple[Array, Array]:
         """Wind along the shaft and tip-speed ratio."""
@@ -50,10 +65,12 @@ class RigidRotor:
         """Shaft power [W]; wind [m/s], rotor speed [rad/s], pitch [rad] broadcast."""
         along, ratio = self._blown(wind, speed)
         q = self.parameters["q_area"] * along**2 * self.parameters["radius"] * np.asarray(speed, float)
-        if self._torque is None:
-            values = self.tables.coefficients["torque"][:, 0] * self.parameters["cos_cone"]
-            return q * np.interp(ratio, self.tables.tip_speed_ratio, values)
-        return q * self._torque.ev(ratio, pitch)
+        return q * self._coefficient("torque", ratio, pitch)
+
+    def thrust(self, wind: Any, speed: Any, pitch: Any) -> Array:
+        """Along the shaft [N]; arguments as for `power`."""
+        along, ratio = self._blown(wind, speed)
+        return self.parameters["q_area"] * along**2 * self._coefficient("thrust", ratio, pitch)
 
     def sensitivity(self, wind: Array, speed: float, pitch: Array) -> Array:
         """-dP/dtheta [W/rad], the wake in equilibrium with the new pitch, (n,)."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from fatigue_runner.turbine.aerodynamics import (
     STEPS,
     BladeAerodynamics,
     blade_aerodynamics,
-    rotor_loads,
+    loads_beyond,
 )
 from fatigue_runner.turbine.beam import blade_modes
 from fatigue_runner.turbine.file import AirfoilFile
@@ -60,13 +60,26 @@ def load_coefficients(
     blade: BladeAerodynamics, tip_speed_ratio: Array, pitch: Array, skewed_wake: bool = True
 ) -> Array:
     """Loads and derivatives (k, ...) in the order of `table_names`; the arguments broadcast, pitch in rad."""
-    rows = [rotor_loads(blade, tip_speed_ratio, pitch)]
+    return coefficients_beyond(blade, (blade.weights,), tip_speed_ratio, pitch, skewed_wake)[0]
+
+
+def coefficients_beyond(
+    blade: BladeAerodynamics,
+    weights: Sequence[Array],
+    tip_speed_ratio: Array,
+    pitch: Array,
+    skewed_wake: bool = True,
+) -> Array:
+    """The same of parts of the blade by their `weights`, (parts, k, ...)."""
+    rows = [loads_beyond(blade, weights, tip_speed_ratio, pitch)]
     for name in perturbations(skewed_wake):
         size = STEPS[name]
         step = size * (tip_speed_ratio if name in IN_PLANE else np.ones_like(tip_speed_ratio))
-        above, below = (rotor_loads(blade, tip_speed_ratio, pitch, **{name: s}) for s in (step, -step))
+        above, below = (
+            loads_beyond(blade, weights, tip_speed_ratio, pitch, **{name: s}) for s in (step, -step)
+        )
         rows.append((above - below) / (2 * step))
-    return np.stack(rows, axis=1).reshape(len(rows) * len(LOAD_NAMES), *rows[0].shape[1:])
+    return np.stack(rows, axis=2).reshape(len(weights), len(rows) * len(LOAD_NAMES), *rows[0].shape[2:])
 
 
 def build_tables(

@@ -65,7 +65,7 @@ class AeroTables:
                 f"pitch {np.degrees(pitch):g} deg is outside the aerodynamic table "
                 f"({np.degrees(low):g} to {np.degrees(high):g} deg)"
             )
-        stack = np.stack([self._coefficient(name) for name in names], axis=-1)
+        stack = np.stack([self.coefficient(name) for name in names], axis=-1)
         if len(self.pitch) == 1:
             return stack[:, 0]
         if self.interpolation == "bilinear":
@@ -76,7 +76,7 @@ class AeroTables:
 
         return CubicSpline(self.pitch, stack, axis=1)(pitch)
 
-    def _coefficient(self, name: str) -> NDArray[np.float64]:
+    def coefficient(self, name: str) -> NDArray[np.float64]:
         """(n, k) of a table, zero without one; `X_w`, by an azimuthal harmonic of the wind, from the tables X and X_kappa."""
         shape = (len(self.tip_speed_ratio), len(self.pitch))
         if name in self.coefficients or not name.endswith("_w"):

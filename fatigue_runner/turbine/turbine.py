@@ -48,7 +48,7 @@ class Turbine:
     base_height: of the tower's foot above ground [m];
     operating_wind: from cut-in to cut-out [m/s], None where the file does not say;
     generator_efficiency: electrical power over mechanical power;
-    file: the name or path that it was loaded by, "" for a mapping.
+    file: the name or path that it was loaded by, "" for a mapping; content: of the turbine file, None for a full parameter set.
     """
 
     name: str
@@ -65,6 +65,7 @@ class Turbine:
     generator_efficiency: float = 1.0
     base_height: float = 0.0
     file: str = ""
+    content: Mapping[str, Any] | None = field(default=None, repr=False)
 
     @property
     def layout(self) -> Layout:
@@ -308,23 +309,49 @@ class Turbine:
         """
         from fatigue_runner.turbine.lanes import load_channels
 
-        angle, x, blown = (np.asarray(values, float) for values in (pitch, state, wind))
+        x = np.asarray(state, float)
+        data, rows, control = self._driven(x, wind, pitch, signals)
+        found = load_channels(data, x, rows, control)
+        mechanical = found["generator_torque"] * x[:, self.layout.generator_speed]
+        return found | {
+            "generator_power": self.generator_efficiency * mechanical,
+            "blade_pitch": self.turned(x, pitch),
+        }
+
+    def turned(self, state: Array, pitch: ArrayLike = 0.0) -> Array:
+        """Blade pitch [rad] (n,) in states (n, k): what the controller makes of them, else `pitch`."""
+        angle = np.asarray(pitch, float) if self.controller is None else self.commanded(state)["pitch"]
+        return np.broadcast_to(angle, len(state)).astype(float)
+
+    def derivative(
+        self,
+        state: ArrayLike,
+        wind: ArrayLike,
+        pitch: ArrayLike = 0.0,
+        signals: Sequence[Channel] | None = None,
+    ) -> Array:
+        """Time derivatives (n, k) of states (n, k); wind, pitch and signals as in `loads`."""
+        from fatigue_runner.turbine.lanes import evaluate
+
+        x = np.asarray(state, float)
+        data, rows, control = self._driven(x, wind, pitch, signals)
+        turned = None if control is None else np.ascontiguousarray(control.T)
+        return evaluate(data, np.ascontiguousarray(x.T), np.ascontiguousarray(rows.T), turned)[0].T
+
+    def _driven(
+        self, x: Array, wind: ArrayLike, pitch: ArrayLike, signals: Sequence[Channel] | None
+    ) -> tuple[KernelData, Array, Array | None]:
+        """What the kernels read for states (n, k): turbine, wind (n, rows), and control signals (n, 1) where the pitch is one."""
+        angle, blown = np.asarray(pitch, float), np.asarray(wind, float)
         known = (*self.layout.wind, *HARMONICS)[: blown.shape[1]] if signals is None else signals
         rows = np.zeros((len(blown), self.layout.wind_size(known)))
         rows[:, self.layout.wind_rows(known)] = blown
         harmonics = self.layout.beyond(known)
-        turned = angle
         if self.controller is not None:
-            angle, turned = np.asarray(0.0), self.commanded(x)["pitch"]
+            angle = np.asarray(0.0)
         if angle.ndim:
-            found = load_channels(self.pitched_kernel_data(harmonics), x, rows, angle[:, None])
-        else:
-            found = load_channels(self.kernel_data(float(angle), harmonics), x, rows)
-        mechanical = found["generator_torque"] * x[:, self.layout.generator_speed]
-        return found | {
-            "generator_power": self.generator_efficiency * mechanical,
-            "blade_pitch": np.broadcast_to(turned, len(x)).astype(float),
-        }
+            return self.pitched_kernel_data(harmonics), rows, angle[:, None]
+        return self.kernel_data(float(angle), harmonics), rows, None
 
     def operating_point(
         self,
@@ -483,7 +510,7 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
         base_height=float(data["geometry"]["tower_base_height"]),
         file="" if isinstance(source, Mapping) else str(source),
         sections=sections, operating_wind=None if wind is None else (float(wind[0]), float(wind[1])),
-        generator_efficiency=float(data["generator"].get("efficiency", 1.0)),
+        generator_efficiency=float(data["generator"].get("efficiency", 1.0)), content=data,
     )  # fmt: skip
 
 

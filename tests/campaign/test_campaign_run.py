@@ -91,6 +91,30 @@ def test_the_csv_has_the_columns_in_order_and_empty_cells_for_the_unknown(world,
     assert float(rows[1]["nrmse_max"]) == results.rows[1]["nrmse_max"]
 
 
+def test_the_root_by_direction_is_counted_logged_and_read_again_from_the_log(world, tmp_path, out):
+    text = CAMPAIGN + "fatigue: {wohler_exponents: [4]}\n"
+    run_campaign(write_campaign(tmp_path, text), out)
+    campaign = write_campaign(tmp_path, text + "loads: {root_directions: 4}\n")
+    world.calls.clear()
+    results = run_campaign(campaign, out)
+    assert world.calls == []  # from the logs, which get the new channels
+    flap, edge, diagonal = (
+        np.array(results.column(f"del_{name}_m4"))
+        for name in ("RootMyb1", "RootMxb1", "blade1_root_moment_45deg")
+    )
+    # the toy's loads are in phase
+    np.testing.assert_allclose(diagonal, (flap + edge) / np.sqrt(2), rtol=1e-12)
+    assert results.column("del_blade1_root_moment_0deg_m4") == results.column("del_RootMyb1_m4")
+    log = read_log(out / "logs" / "v08.00_heun_50ms.mcap")
+    np.testing.assert_allclose(log["blade1_root_moment_90deg"], log["RootMxb1"], rtol=1e-12)
+    assert results.column("max_blade1_root_moment_45deg")[0] == pytest.approx(log_max(out))
+    assert read_results(out)[0]["del_error_blade1_root_moment_135deg_m4"] == ""  # the reference's
+
+
+def log_max(out):
+    return float(read_log(out / "logs" / "v06.00_rk7_10ms.mcap")["blade1_root_moment_45deg"].max())
+
+
 def test_the_parquet_table_equals_the_rows(world, campaign, out):
     parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
     results = run_campaign(campaign, out)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fatigue_runner.campaign.spec import Campaign, campaign_source, parse_campaign
-from fatigue_runner.channels import LOAD_NAMES, OPENFAST
+from fatigue_runner.channels import BY_NAME, OPENFAST
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.sweep import Random, Range, expand
 
@@ -341,4 +342,26 @@ def test_openfast_s_names_of_channels_are_understood(tmp_path):
         "blade1_root_flapwise_moment", "tower_base_fore_aft_moment", "blade2_root_edgewise_moment", "rotor_thrust"
     ]  # fmt: skip
     assert campaign.log.channels == ["generator_torque", "rotor_speed"]
-    assert set(OPENFAST.values()) <= set(LOAD_NAMES)
+    assert set(OPENFAST.values()) <= set(BY_NAME)
+
+
+def test_sections_are_counted_and_logged_where_loads_asks_for_them(tmp_path):
+    text = (
+        MINIMAL
+        + "loads: {tower_heights: {start: 0, stop: 40, step: 20}, blade_radii: [30, 1.5], root_directions: 2}\n"
+    )
+    campaign = parse(tmp_path, text + "log: {channels: [TwHt2MLyt, Spn1MLxb1, blade1_root_moment_90deg]}\n")
+    assert campaign.logged == [
+        "tower_20m_fore_aft_moment",
+        "blade1_1.5m_edgewise_moment",
+        "blade1_root_moment_90deg",
+    ]
+    assert campaign.counted[:4] == campaign.fatigue.channels and len(campaign.counted) == 4 + 6 + 4 + 2
+    for wrong, said in {
+        "log: {channels: [TwHt4MLyt]}": "log: 'TwHt4MLyt' is a section that `loads` does not ask for; add it there",
+        "fatigue: {channels: [tower_20m_fore_aft_moment]}": "is counted where `loads` asks for its section; leave it out here",
+    }.items():
+        with pytest.raises(InputError, match=re.escape(said)):
+            parse(tmp_path, text + wrong + "\n")
+    with pytest.raises(InputError, match="two places differ in digits that no name shows"):
+        parse(tmp_path, MINIMAL + "loads: {tower_heights: [20, 20.000001]}\n")

@@ -40,7 +40,7 @@ def build(run: Run) -> Section:
     caption = (
         f"Tower-top fore-aft displacement x_FA at {len(winds)} winds of the campaign (above), and its "
         f"distance from the reference {run.reference.label} (below; running maximum over {ENVELOPE:g} s). "
-        f"A curve that ends in × diverged there{_whole(run)}." + left_out(run, shown)
+        f"A curve that ends in × diverged there{window_words(run)}." + left_out(run, shown)
     )
     return Section(
         title,
@@ -48,7 +48,7 @@ def build(run: Run) -> Section:
     )
 
 
-def _whole(run: Run) -> str:
+def window_words(run: Run) -> str:
     """How much of the time is shown, where it is not all."""
     begin = float(run.setting("discard", 0.0))
     counted = float(run.setting("duration", WINDOW)) - begin
@@ -64,7 +64,8 @@ def _series(run: Run, wind: WindCase, summary: MethodSummary | None) -> tuple[np
     inside = (log.time >= start) & (log.time <= start + WINDOW)
     if inside.sum() < 2:  # it diverged before or as the counted time began
         return None
-    return np.asarray(log.time)[inside], np.asarray(log.state)[inside, STATE_NAMES.index(STATE)]
+    values = np.asarray(log.state)[inside, STATE_NAMES.index(STATE)] if len(log.state) else np.full(2, np.nan)
+    return (np.asarray(log.time)[inside], values) if np.isfinite(values).all() else None
 
 
 def _draw(run: Run, winds: list[WindCase], shown: list[MethodSummary]) -> str:

@@ -1247,18 +1247,10 @@ def full_motion(m: Motion, sheet: Sheet, name: str, spin_rate: sp.Expr | int = 0
     )  # fmt: skip
 
 
-def blade_root(
-    sheet: Sheet, aero: Aerodynamics, m: Motion, number: int
-) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
-    """One blade's force and moment about the apex on the hub, and its moment about the root, in coned axes."""
-    b = blade_symbols(sheet, number)
-    fdd, edd = sheet.states.flap(number, 2), sheet.states.edge(number, 2)
-    own = Motion(
-        m.t_a, m.t_s, m.w_a, m.w_s,
-        coned(sheet, "lw", m.omega, number),
-        coned(sheet, "lg", m.acceleration, number),
-        coned(sheet, "lsp", m.spin, number),
-    )  # fmt: skip
+def blade_inertia(
+    sheet: Sheet, own: Motion, b: Blade, rates: tuple[sp.Symbol, sp.Symbol], number: int | str = ""
+) -> tuple[sp.Matrix, sp.Matrix]:
+    """Inertia plus weight of a blade: force, and moment about the apex; `own`: motion of the hub in the blade's axes, rates: (f'', e'')."""
     first = sheet.let_vector(f"bs{number}", b.first_moment())
     inertia = let_symmetric(sheet, f"bi{number}", inertia_of(b.second_moment()))
     inertia_rate = let_symmetric(sheet, f"bid{number}", b.rate(inertia_of(b.second_moment())))
@@ -1268,14 +1260,43 @@ def blade_root(
         sheet, f"blade{number}", own, P["b_m"], first, b.rate(b.first_moment()), b.first_moment_rate2(),
         inertia, inertia_rate * own.omega, l_f * b.fd + l_e * b.ed,
     )  # fmt: skip
-    force = force + p_f * fdd + p_e * edd
-    moment = moment + l_f * fdd + l_e * edd
+    fdd, edd = rates
+    return force + p_f * fdd + p_e * edd, moment + l_f * fdd + l_e * edd
+
+
+def blade_root(
+    sheet: Sheet, aero: Aerodynamics, m: Motion, number: int
+) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
+    """One blade's force and moment about the apex on the hub, and its moment about the root, in coned axes."""
+    b = blade_symbols(sheet, number)
+    rates = sheet.states.flap(number, 2), sheet.states.edge(number, 2)
+    force, moment = blade_inertia(sheet, carried_blade(sheet, m, number), b, rates, number)
     pressure, pressure_r = aero.pressure, aero.pressure * P["radius"]
     aero_force = sp.Matrix([aero.load("thrust", number), -aero.load("tangential", number), 0]) * pressure
     aero_moment = sp.Matrix([aero.load("torque", number), aero.load("bending", number), 0]) * pressure_r
     force = sheet.let_vector(f"blade{number}_net", aero_force - force)
     moment = sheet.let_vector(f"blade{number}_netm", aero_moment - moment)
     return force, moment, moment - cross([0, 0, P["b_root"]], force)
+
+
+def carried_blade(sheet: Sheet, m: Motion, number: int) -> Motion:
+    """The hub's motion in a blade's coned axes."""
+    return Motion(
+        m.t_a, m.t_s, m.w_a, m.w_s,
+        coned(sheet, "lw", m.omega, number),
+        coned(sheet, "lg", m.acceleration, number),
+        coned(sheet, "lsp", m.spin, number),
+    )  # fmt: skip
+
+
+def rotor_load(m: Motion, blades: Sequence[tuple[sp.Matrix, sp.Matrix]]) -> tuple[sp.Matrix, sp.Matrix]:
+    """Force and moment about the apex of hub and blades, in F, from those of the blades in their coned axes; m: as `full_motion`."""
+    hub_tensor = sp.diag(P["h_ixx"], P["h_itt"], P["h_itt"])
+    force = -P["h_m"] * m.acceleration
+    moment = -(hub_tensor * m.spin + cross(m.omega, hub_tensor * m.omega))
+    for number, (f, mom) in enumerate(blades, start=1):
+        force, moment = force + from_blade(f, number), moment + from_blade(mom, number)
+    return force, moment
 
 
 def from_blade(v, number: int) -> sp.Matrix:
@@ -1296,22 +1317,21 @@ def load_channels(
     phidd = states.of("phi", 2)
     rotating = full_motion(m, sheet, "hub", phidd)
     out: dict[str, sp.Expr] = {}
-    force = -P["h_m"] * rotating.acceleration
-    hub_tensor = sp.diag(P["h_ixx"], P["h_itt"], P["h_itt"])
-    moment = -(hub_tensor * rotating.spin + cross(m.omega, hub_tensor * m.omega))
+    blades = []
     cp, spitch = P["cos_pitch"], P["sin_pitch"]
     for number in (1, 2, 3):
         f, mom, root = blade_root(sheet, aero, rotating, number)
-        force, moment = force + from_blade(f, number), moment + from_blade(mom, number)
+        blades.append((f, mom))
         # section axes turn with the pitch about e3, towards feather
         out[f"blade{number}_root_edgewise_moment"] = cp * root[0] - spitch * root[1]
         out[f"blade{number}_root_flapwise_moment"] = spitch * root[0] + cp * root[1]
         b = blade_symbols(sheet, number)
         out[f"blade{number}_tip_out_of_plane"] = P["b_tip_fx"] * b.f + P["b_tip_ex"] * b.e
         out[f"blade{number}_tip_in_plane"] = P["b_tip_fy"] * b.f + P["b_tip_ey"] * b.e
+    force, moment = rotor_load(rotating, blades)
     force = sheet.let_vector("rotor_force", force)
     moment = sheet.let_vector("rotor_moment", moment)
-    out |= tower_base(sheet, top, force, moment)
+    out |= tower_base(sheet, top, force, moment)[0]
     out["generator_torque"] = torque = generator_torque(sheet, controlled)
     out["low_speed_shaft_torque"] = shaft_torque(sheet, torque) + rigid_inertia(sheet) * phidd
     out["rotor_thrust"] = sheet.constant(3 * P["cos_cone"]) * aero.mean("thrust") * aero.pressure
@@ -1319,8 +1339,11 @@ def load_channels(
     return sheet, out
 
 
-def tower_base(sheet: Sheet, top: Motion, force: sp.Matrix, moment: sp.Matrix) -> dict[str, sp.Expr]:
-    """Tower-base moments from the rotor's force and moment about the apex (in F), nacelle, generator and tower."""
+def tower_base(
+    sheet: Sheet, top: Motion, force: sp.Matrix, moment: sp.Matrix
+) -> tuple[dict[str, sp.Expr], sp.Matrix]:
+    """Tower-base moments from the rotor's force and moment about the apex (in F), nacelle, generator and tower; and the force on the
+    tower's top, in I."""
     a, s = tower(sheet)
     add, sdd = tower(sheet, 2)
 
@@ -1353,4 +1376,58 @@ def tower_base(sheet: Sheet, top: Motion, force: sp.Matrix, moment: sp.Matrix) -
     return {
         "tower_base_fore_aft_moment": base[1] - P["t_zfa"] * add + g * P["t_fa"] * a,
         "tower_base_side_side_moment": base[0] + P["t_zss"] * sdd - g * P["t_ss"] * s,
+    }, force_i
+
+
+# --- what the loads of sections are made of: plain functions over arrays, the same for the whole family -----------------
+
+
+def hub_motion() -> tuple[Sheet, dict[str, sp.Expr]]:
+    """How the hub moves, in F and in the blades' coned axes, and what wind the blades meet; by the names of `section_loads`."""
+    sheet = Sheet()
+    top = tower_top(sheet)
+    m = hub(sheet, top)
+    aero = inflow(sheet, m, harmonics=True)
+    moving = full_motion(m, sheet, "hub", sheet.states.of("phi", 2))
+    out = {"tip_speed_ratio": TIP_SPEED_RATIO, "pressure": aero.pressure, "normal": aero.normal}
+    mean, *uniform = aero.uniform
+    out["w_mean"] = mean
+    for key, part in (("kappa", aero.kappa), ("y", aero.inplane), ("skew", aero.skew), ("w", uniform)):
+        out |= {f"{key}_cos": part[0], f"{key}_sin": part[1]}
+    seen = {"": moving} | {f"{number}": carried_blade(sheet, moving, number) for number in (1, 2, 3)}
+    for place, motion in seen.items():
+        for name in ("omega", "acceleration", "spin"):
+            out |= {f"{name}{place}_{axis}": x for axis, x in zip("xyz", getattr(motion, name), strict=True)}
+    return sheet, out
+
+
+def _vector(name: str) -> sp.Matrix:
+    return sp.Matrix([sp.Symbol(f"{name}_{axis}", real=True) for axis in "xyz"])
+
+
+def section_blade() -> tuple[Sheet, dict[str, sp.Expr]]:
+    """Inertia plus weight of the part of a blade whose mass integrals are given: force and moment about the apex."""
+    sheet, none = Sheet(), sp.zeros(3, 1)
+    own = Motion(none, none, none, none, _vector("omega"), _vector("acceleration"), _vector("spin"))
+    b = blade_symbols(sheet)
+    force, moment = blade_inertia(sheet, own, b, sp.symbols("fdd edd", real=True))
+    named = zip("xyz", force, moment, strict=True)
+    return sheet, {
+        f"{what}_{axis}": x
+        for axis, *pair in named
+        for what, x in zip(("force", "moment"), pair, strict=True)
     }
+
+
+def section_tower() -> tuple[Sheet, dict[str, sp.Expr]]:
+    """Tower-base moments and the force on the tower's top from the forces and moments of the blades and the motion of the hub in F."""
+    sheet, none = Sheet(), sp.zeros(3, 1)
+    top = tower_top(sheet)
+    moving = Motion(none, none, none, none, _vector("omega"), _vector("acceleration"), _vector("spin"))
+    force, moment = rotor_load(
+        moving, [(_vector(f"force{number}"), _vector(f"moment{number}")) for number in (1, 2, 3)]
+    )
+    out, at_top = tower_base(
+        sheet, top, sheet.let_vector("rotor_force", force), sheet.let_vector("rotor_moment", moment)
+    )
+    return sheet, out | {f"force_{axis}": x for axis, x in zip("xyz", at_top, strict=True)}
