@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import typing
 
 import pytest
 from places import ROOT
@@ -91,6 +92,60 @@ def test_the_page_of_channels_is_what_the_program_says():
     ]
     assert re.findall(r"^\| `\w+` \| [^|]+ \| [^|]+ \| [^|]+ \|$", page, re.MULTILINE) == rows
     assert all(channel_name(n.upper()) == c for c, found in names.items() for n in found)
+
+
+def test_every_key_of_a_recipe_stands_on_its_page():
+    from pydantic import BaseModel
+
+    from fatigue_runner.corrector import families  # noqa: F401  (fills the register)
+    from fatigue_runner.corrector.recipe import FAMILIES, GuardRecipe, Spread, Winds
+
+    def keys(section: type[BaseModel]) -> set[str]:
+        nested = {
+            part
+            for field in section.model_fields.values()
+            for part in (field.annotation, *typing.get_args(field.annotation))
+            if isinstance(part, type) and issubclass(part, BaseModel)
+        }
+        return set(section.model_fields).union(*map(keys, nested))
+
+    assert FAMILIES, "every family is found"
+    every = set().union(*map(keys, (*FAMILIES.values(), Winds, Spread, GuardRecipe)))
+    told = set(re.findall(r"`(\w+)`", (DOCS / "recipes.md").read_text(encoding="utf-8")))
+    assert {"samples", "kappa", "hidden", "rounds", "margin"} <= every
+    assert not every - told, f"docs/recipes.md does not tell of {', '.join(sorted(every - told))}"
+
+
+def test_the_readme_s_answer_is_part_of_the_table_that_it_leads_to():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8").split("## Which integrator?")[1].split("## ")[0]
+    answer = re.findall(r"^\| (`.+? ms) \| (\d+) \| ([^|]+?) \|$", readme, re.MULTILINE)
+    page = (DOCS / "integrators.md").read_text(encoding="utf-8").replace("**", "")
+    assert len(answer) == 6
+    for row in answer:
+        assert "| " + " | ".join(row) + " |" in page
+
+
+def test_the_campaign_behind_the_answer_is_valid():
+    from ruamel.yaml import YAML
+
+    from fatigue_runner.campaign.spec import parse_campaign
+    from fatigue_runner.inputs.source import Source
+
+    page = (DOCS / "integrators.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    campaign = parse_campaign(Source("integrators.md", YAML(typ="safe").load(text)))
+    found = {(i.method, i.corrector) for i in campaign.integrators}
+    told = set(re.findall(r"^\| \**`(\w+)` [\d.]+ ms", page, re.MULTILINE))
+    assert {method for method, _ in found} == told
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_files_that_a_page_cites_are_in_the_repository(page):
+    """In backticks, with a folder of the repository before them."""
+    text = re.sub(r"```.*?```", "", PAGES[page].read_text(encoding="utf-8"), flags=re.DOTALL)
+    folders = "fatigue_runner|tests|tools|docs|campaigns|correctors|examples|benchmark|prototypes"
+    cited = re.findall(rf"`(?:\.\./)*((?:{folders})/[\w./-]+\.\w+)`", text)
+    assert [name for name in cited if not (ROOT / name).is_file()] == []
 
 
 def test_the_logs_that_help_texts_name_are_those_of_the_quickstart():
