@@ -60,9 +60,16 @@ class Source:
         return self._lines[self._known(path)] if self.text else None
 
     def where(self, path: tuple[str | int, ...] = ()) -> str:
-        """The place as a user reads it: `campaigns/sweep.yaml:14`."""
-        line = self.line(path)
-        return self.name if line is None else f"{self._names.get(self._known(path), self.name)}:{line}"
+        """The place as a user reads it: `campaigns/sweep.yaml:14`; `mine.yaml:4 over base.yaml:14` of an entry of the base whose
+        section this file changes, so that either may be what is wrong."""
+        line, known = self.line(path), self._known(path)
+        if line is None:
+            return self.name
+        if known not in self._names:
+            return f"{self.name}:{line}"
+        beside = [at for at in self._lines if at[:-1] == known[:-1] and len(at) > 1 and at not in self._names]
+        below = f"{self._names[known]}:{line}"
+        return f"{self.name}:{self._lines[beside[0]]} over {below}" if beside else below
 
     def _known(self, path: tuple[str | int, ...]) -> tuple[str | int, ...]:
         known: tuple[str | int, ...] = ()

@@ -113,7 +113,7 @@ class Regions(Section):
     """The torque law of `law: regions`; region 3 has constant power or constant torque."""
 
     region_3_speed_rpm: Positive
-    slip_percent: Positive
+    slip_percent: Annotated[float, Field(ge=0.01, le=100)]
     rated_mechanical_power: Positive | None = None
     rated_torque: Positive | None = None
     blend_torque: NotNegative
@@ -318,6 +318,13 @@ class TurbineFile(Section):
     operating_wind: list[float] | None = Field(default=None, min_length=2, max_length=2)
     aerodynamics: Aerodynamics
 
+    @field_validator("name")
+    @classmethod
+    def _part_of_file_names(cls, name: str) -> str:
+        if any(letter in "/\\" or not letter.isprintable() for letter in name):
+            raise problem(f"becomes part of files' names, so it has no `/` and no `\\`; got {name!r:.60}")
+        return name
+
     @field_validator("model")
     @classmethod
     def _known_model(cls, model: str) -> str:
@@ -400,6 +407,10 @@ def check_turbine(source: Source) -> dict[str, Any]:
         return dict(source.data)
     validated(TurbineFile, source)
     data = with_modes(source.data)
+    if (
+        data["aerodynamics"].get("airfoils", "") is None
+    ):  # taken away from the base's: tables without what they were made of
+        data["aerodynamics"] = {k: v for k, v in data["aerodynamics"].items() if k != "airfoils"}
     check_consistency(data, source)
     return data
 

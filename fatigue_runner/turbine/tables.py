@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fatigue_runner.encoded import refuse_pointer
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.rotor import SQUARE
 
@@ -52,9 +55,13 @@ class AeroTables:
             raise InputError("aerodynamic tables: tip_speed_ratio must rise in at least 3 equal steps")
         shape = (len(self.tip_speed_ratio), len(self.pitch))
         for name, values in self.coefficients.items():
-            if values.shape != shape or not np.isfinite(values).all():
+            if values.shape != shape:
                 raise InputError(
-                    f"aerodynamic tables: {name} must be finite numbers of shape {shape}, got {values.shape}"
+                    f"aerodynamic tables: {name} must have the shape {shape}, got {values.shape}"
+                )
+            if not np.isfinite(values).all():
+                raise InputError(
+                    f"aerodynamic tables: {name} must be finite numbers; {np.sum(~np.isfinite(values))} of {values.size} are not"
                 )
 
     def at_pitch(self, pitch: float, names: Sequence[str]) -> NDArray[np.float64]:
@@ -182,13 +189,36 @@ class AeroTables:
         return [highest_first[3 - power] * width**power for power in range(4)]
 
 
-def read_tables(path: Path, interpolation: str) -> AeroTables:
-    """Tables of an npz written by tools/build_aero_tables.py. Raises InputError where it is missing or of another kind."""
+@contextmanager
+def table_file(path: Path) -> Iterator[Any]:
+    """The arrays of a table file, by name. Raises InputError where it is missing, or no such file."""
     if not path.is_file():
         raise InputError(
-            f"aerodynamic tables {path} do not exist; make them with `fatigue-runner turbine tables FILE`"
+            f"aerodynamic tables {path} do not exist (aerodynamics: tables names them); {_MAKE_TABLES}"
         )
-    with np.load(path, allow_pickle=False) as data:
+    refuse_pointer(path.read_bytes()[:64], path, "aerodynamic tables")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            yield data
+    except InputError:
+        raise
+    except (OSError, ValueError, TypeError, AttributeError, EOFError, KeyError, BadZipFile) as error:
+        cause = (
+            f"it has no {str(error.args[0]).split()[0]}"
+            if isinstance(error, KeyError)
+            else "it is cut off, or another file"
+        )
+        raise InputError(
+            f"{path} holds no aerodynamic tables ({cause}; aerodynamics: tables names it); {_MAKE_TABLES}"
+        ) from None
+
+
+_MAKE_TABLES = "make them with `fatigue-runner turbine tables FILE`"
+
+
+def read_tables(path: Path, interpolation: str) -> AeroTables:
+    """Tables of an npz written by tools/build_aero_tables.py. Raises InputError where it is missing or of another kind."""
+    with table_file(path) as data:
         names = [str(n) for n in data["names"]]
         coefficients = dict(zip(names, data["coefficients"].astype(float), strict=True))
         weight = None

@@ -22,7 +22,7 @@ from fatigue_runner.turbine.file import check_turbine, mapping_source, read_turb
 from fatigue_runner.turbine.parameters import DEFAULTS, at_pitch, checked, equation_parameters
 from fatigue_runner.turbine.rated import rated_rotor_speed
 from fatigue_runner.turbine.rigid import RigidRotor
-from fatigue_runner.turbine.tables import AeroTables, read_tables, tables_from_mapping
+from fatigue_runner.turbine.tables import AeroTables, read_tables, table_file, tables_from_mapping
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine.lanes import KernelData
@@ -498,7 +498,9 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     # a law without regions has no rated speed that a pitch could hold
     given = data.get("control") if data["generator"]["law"] == "regions" else None
     control = _control(given, data, parameters, tables) if given else None
-    tower = tuple((float(height), float(diameter)) for height, diameter in data["tower"].get("diameters", ()))
+    tower = tuple(
+        (float(height), float(diameter)) for height, diameter in data["tower"].get("diameters") or ()
+    )
     sections = {
         where: (float(circle["diameter"]), float(circle["wall"]))
         for where, circle in (data.get("sections") or {}).items()
@@ -533,7 +535,7 @@ def _check_inputs(path: Path, data: Mapping[str, Any]) -> None:
     """Refuse tables that were made for another blade."""
     from fatigue_runner.turbine.table_builder import turbine_inputs
 
-    with np.load(path, allow_pickle=False) as stored:
+    with table_file(path) as stored:
         made_for = str(stored["inputs"]) if "inputs" in stored else ""
     # tables from another program carry no such hash: whoever gives them answers for them
     if made_for and "airfoils" in data["aerodynamics"] and made_for != turbine_inputs(data):

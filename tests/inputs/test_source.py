@@ -30,7 +30,7 @@ def test_what_is_laid_over_merges_mappings_replaces_the_rest_and_keeps_both_plac
     over = parse("x: 0\nb:\n  d: [9]\ne: 5\n").over(base)
     assert over.data == {"a": 1, "b": {"c": 2, "d": [9]}, "e": 5, "x": 0}
     assert over.where(("b", "d")) == "a.yaml:3"
-    assert over.where(("b", "c")) == "base.yaml:2"
+    assert over.where(("b", "c")) == "a.yaml:3 over base.yaml:2", "one of the two files is wrong"
     assert over.where(("a",)) == "base.yaml:1"
     assert over.where(("b", "new")) == "a.yaml:2"
     third = parse("a: 2\n", "third.yaml").over(over)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from places import TURBINE_DATA
 
@@ -86,6 +87,28 @@ REFUSED = {
     ),
     "unknown interpolation": ("aerodynamics: {interpolation: cubc}", "'cubc' is not known; did you mean 'cubic'?"),
     "a key twice": ("base: t2b1i1cg", "mine.yaml:3: key 'base' is given twice"),
+    "no slip": ("generator: {regions: {slip_percent: 1e-30}}", "mine.yaml:3: generator.regions.slip_percent must be at least 0.01"),
+    "text with a unit": ("hub: {mass: 56 t}", "mine.yaml:3: hub.mass must be a number; got '56 t'"),
+    "a list for a number": ("hub: {mass: [1, 2]}", "mine.yaml:3: hub.mass must be a number; got [1, 2]"),
+    "nothing for a number": ("hub:\n  mass:", "mine.yaml:4: hub.mass must be a number; got None"),
+    "infinite": ("hub: {mass: .inf}", "mine.yaml:3: hub.mass must be a finite number"),
+    "a decimal comma": ("hub: {mass: '1,5'}", "mine.yaml:3: hub.mass must be a number; got '1,5'"),
+    "a key twice in a section": ("hub:\n  mass: 1\n  mass: 2", "mine.yaml:5: key 'mass' is given twice in one section"),
+    "indented with a tab": ("hub:\n\tmass: 1", "mine.yaml:4: the line is indented with a tab"),
+    "heights in metres": (
+        "tower:\n  stations:\n    columns: [height_fraction, mass_density, fore_aft_stiffness, side_side_stiffness]\n"
+        "    rows: [[0, 5000, 6e11, 6e11], [87.6, 2500, 1e11, 1e11]]",
+        "mine.yaml:4: tower.stations: height_fraction must rise from 0 to 1",
+    ),
+    "rows that are no rows": ("blade: {stations: {rows: [1]}}", "mine.yaml:3: blade.stations.rows[0] must be a list; got 1"),
+    "no stations": ("blade: {stations: [[0, 1]]}", "mine.yaml:3: blade.stations: must be a section with the keys columns, rows"),
+    "a number for a key": ("hub:\n  5: 3", "mine.yaml:4: unknown key '5' in hub; known: mass, inertia, centre_of_mass"),
+    "entries that contradict the base's": (
+        "geometry: {tip_radius: 95}",
+        "mine.yaml:3 over {base}:24: the tower is too short: the hub is 90 m above ground and the blades reach 95 m down",
+    ),
+    "airfoils that are not there": ("aerodynamics:\n  airfoils: no.yaml", "airfoil file no.yaml does not exist"),
+    "tables that are not there": ("aerodynamics: {tables: no.npz}", "aerodynamic tables no.npz do not exist (aerodynamics: tables names"),
     "broken yaml": ("hub: {mass: 1", "not valid YAML"),
 }  # fmt: skip
 
@@ -93,9 +116,44 @@ REFUSED = {
 @pytest.mark.parametrize(("text", "message"), REFUSED.values(), ids=REFUSED.keys())
 def test_what_is_wrong_is_refused_with_its_place_and_the_way_out(tmp_path, text, message):
     told = refusal(tmp_path, text)
-    assert message in told
-    assert told.startswith("mine.yaml")
+    assert message.replace("{base}", str(TURBINE_DATA / "nrel5mw.yaml")) in told
+    assert told.startswith("mine.yaml") or "does not exist" in told or "do not exist" in told
     assert "\n" not in told
+
+
+@pytest.mark.parametrize(
+    ("name", "held", "cause"),
+    [
+        ("text", b"hello", "it is cut off, or another file"),
+        ("empty", b"", "it is cut off, or another file"),
+        ("half", None, "it is cut off, or another file"),
+        ("other", {"a": np.ones(3)}, "it has no names"),
+        (
+            "pointer",
+            b"version https://git-lfs.github.com/spec/v1\noid sha256:a\nsize 3\n",
+            "this is a Git LFS pointer",
+        ),
+    ],
+)
+def test_a_file_that_holds_no_tables_is_told_with_the_way_out(tmp_path, name, held, cause):
+    path = tmp_path / "t.npz"
+    if isinstance(held, dict):
+        np.savez(path, **held)
+    else:
+        whole = (TURBINE_DATA / "nrel5mw_aero.npz").read_bytes()
+        path.write_bytes(whole[: len(whole) // 2] if held is None else held)
+    told = refusal(tmp_path, "aerodynamics: {tables: t.npz}")
+    assert told.startswith("t.npz") and cause in told and "\n" not in told
+
+
+def test_what_a_base_has_may_be_taken_away(tmp_path):
+    (tmp_path / "mine.yaml").write_text(HEAD + "tower: {diameters: null}\naerodynamics: {airfoils: null}\n")
+    assert load_turbine(str(tmp_path / "mine.yaml")).tower == ()
+
+
+@pytest.mark.parametrize("name", ["a/b", "a\\b", '"a\\nb"', "5", "''", "[a]"])
+def test_a_name_that_files_cannot_have_is_refused(tmp_path, name):
+    assert refusal(tmp_path, "", head=f"name: {name}\nbase: nrel5mw\n").startswith("mine.yaml:1: name")
 
 
 def test_without_a_base_every_missing_part_is_named(tmp_path):
