@@ -19,7 +19,7 @@ from fatigue_runner.campaign.store import Store
 from fatigue_runner.campaign.trust import reference_facts
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.results.beyond import beyond
-from fatigue_runner.results.columns import columns
+from fatigue_runner.results.columns import table
 from fatigue_runner.results.table import Results
 from fatigue_runner.turbine.rated import rated_rotor_speed
 
@@ -199,14 +199,16 @@ def _finished(plan: Plan, store: Store) -> str:
 def _collect(plan: Plan, store: Store, simulated: int) -> Results:
     fatigue = plan.campaign.fatigue
     rows = [store.records[case.id]["row"] for case in plan.cases]
+    meanings = table(
+        plan.campaign.counted,
+        fatigue.wohler_exponents,
+        plan.resolved.turbine.layout.states,
+        fatigue.angles,
+    )
     return Results(
         out=store.out,
-        columns=columns(
-            plan.campaign.counted,
-            fatigue.wohler_exponents,
-            plan.resolved.turbine.layout.states,
-            fatigue.angles,
-        ),
+        columns=[column.name for column in meanings],
+        meanings=meanings,
         rows=rows,
         notes=beyond(rows, rated_rotor_speed(plan.resolved.turbine)),
         simulated=simulated,

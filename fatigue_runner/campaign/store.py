@@ -5,7 +5,7 @@
     cases.jsonl     one line per finished case, appended as they come in
     finished/       while cases run: what workers have finished of their blocks, see `pieces`
     logs/           <case id>.mcap
-    results.csv, results.parquet, lifetime.csv, damage.csv, report.html
+    results.csv, columns.csv, results.parquet, lifetime.csv, damage.csv, report.html
 
 A finished case is kept when its hash is unchanged and its log is complete.
 """
@@ -173,7 +173,14 @@ class Store:
         for case_id in self._read_records():
             self.log_path(case_id).unlink(missing_ok=True)
         self._journal.truncate(0)
-        for name in ("results.csv", "results.parquet", "lifetime.csv", "damage.csv", "report.html"):
+        for name in (
+            "results.csv",
+            "columns.csv",
+            "results.parquet",
+            "lifetime.csv",
+            "damage.csv",
+            "report.html",
+        ):
             (self.out / name).unlink(missing_ok=True)
 
 

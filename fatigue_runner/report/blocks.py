@@ -39,11 +39,15 @@ class Figure:
 
 @dataclass(frozen=True)
 class Column:
-    """A table's column: its head, the unit below it, and whether its cells are numbers (set flush right)."""
+    """A table's column: its head, the unit below it, whether its cells are numbers (set flush right), whether they are words that need
+    room, and whether a reader may pick one of its values and see those rows alone.
+    """
 
     head: str
     unit: str = ""
     number: bool = True
+    wide: bool = False
+    pick: bool = False
 
 
 @dataclass(frozen=True)

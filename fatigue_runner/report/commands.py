@@ -17,13 +17,25 @@ def report(
     run_folder: Annotated[
         Path, typer.Argument(metavar="RUN_FOLDER", help="The folder that `run` wrote.", show_default=False)
     ],
+    pdf: Annotated[
+        bool,
+        typer.Option("--pdf", help="Print it as report.pdf, too; needs an installed Chromium or Chrome."),
+    ] = False,
 ) -> None:
     """Write `report.html` of a run folder again.
 
-    Example:
+    Examples:
 
         fatigue-runner report runs/quickstart
+
+        fatigue-runner report runs/quickstart --pdf
     """
     from fatigue_runner.report import write_report
+    from fatigue_runner.report.pdf import find_chromium, write_pdf
 
-    typer.echo(f"report: {write_report(run_folder)}")
+    if pdf:
+        find_chromium()
+    page = write_report(run_folder)
+    typer.echo(f"report: {page}")
+    if pdf:
+        typer.echo(f"PDF: {write_pdf(page)}")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import write_atomically
-from fatigue_runner.report.blocks import Section
+from fatigue_runner.report.blocks import Column, Section
 from fatigue_runner.report.rundata import Run, load_run
 
 
@@ -52,8 +53,18 @@ def render_sections(run: Headed, sections: Sequence[Section]) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["data_uri"] = _data_uri
-    return environment.get_template("page.html").render(run=run, sections=sections)
+    environment.filters |= {"data_uri": _data_uri, "slug": _slug, "classes": _classes}
+    script = (Path(__file__).parent / "page.js").read_text(encoding="utf-8")
+    return environment.get_template("page.html").render(run=run, sections=sections, script=script)
+
+
+def _slug(title: str) -> str:
+    """A title as part of a file's name."""
+    return "-".join(re.findall(r"[a-z0-9]+", title.lower()))
+
+
+def _classes(column: Column) -> str:
+    return " ".join(name for name in ("number", "wide") if getattr(column, name))
 
 
 def _data_uri(svg: str) -> str:

@@ -6,6 +6,8 @@ what was simulated.
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -76,7 +78,6 @@ CASE = (
     Column("nrmse_mean", "accuracy", "RMS error over the reference's range, mean over the states"),
     Column("delta_e", "accuracy", "mean square of error over value, arXiv:2504.05493"),
     Column("delta_e_range", "accuracy", "mean square of error over range"),
-    Column("delta_t", "accuracy", "time saved against another integrator, arXiv:2504.05493; not measured per case"),
 )  # fmt: skip
 
 _FATIGUE = (
@@ -150,6 +151,15 @@ def table(
     ]
     statistics = [_statistic(figure, measured[name]) for figure, name in statistics_keys(states, channels)]
     return [*CASE, *errors, *fatigue, *damage, *statistics]
+
+
+def units_csv(columns: Iterable[Column]) -> str:
+    """What every column of results.csv is, as a table beside it: column, unit, meaning."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("column", "unit", "meaning"))
+    writer.writerows((c.name, c.unit, c.meaning) for c in columns)
+    return text.getvalue()
 
 
 def columns(

@@ -7,7 +7,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from fatigue_runner.channels import channel_name
 from fatigue_runner.encoded import decoded
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.files import write_atomically
-from fatigue_runner.results.columns import NEEDED, kind_of
+from fatigue_runner.results.columns import NEEDED, Column, kind_of, units_csv
 from fatigue_runner.results.frames import to_arrow, to_pandas
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ class Results:
     report_error: str = ""
     life: Life | None = None
     notes: list[str] = field(default_factory=list)  # what limits the figures, in sentences
+    meanings: Sequence[Column] = ()  # of the columns, where they are known
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -78,12 +79,14 @@ class Results:
         return 1 if self.lost or self.report_error else 0
 
     def write(self) -> None:
-        """Write `results.csv`, and `results.parquet` where pyarrow is installed, into the run folder."""
+        """Write `results.csv` with `columns.csv`, which says what its columns are, and `results.parquet` where pyarrow is installed."""
         text = io.StringIO()
         writer = csv.DictWriter(text, self.columns, lineterminator="\n")
         writer.writeheader()
         writer.writerows(self.rows)  # None becomes an empty cell
         write_atomically(self.out / "results.csv", text.getvalue().encode())
+        if self.meanings:
+            write_atomically(self.out / "columns.csv", units_csv(self.meanings).encode())
         self._write_parquet()
 
     def to_pandas(self) -> Any:

@@ -55,7 +55,7 @@ def test_operation_stands_over_wind_with_its_scatter(tmp_path, no_logs, curve):
         "Rotor speed", "Blade pitch", "Generator power", "Rotor thrust"
     ]  # fmt: skip
     # of the reference alone; 0.12 rad/s for every m/s, in rpm
-    assert table.rows[0].cells[:3] == ["5", "1", f"{0.6 * 30 / math.pi:.3g}"]
+    assert table.rows[0].cells[:3] == ["5", "1", f"{0.6 * 30 / math.pi:.2f}"]
 
 
 def test_a_fixed_pitch_has_no_operation_to_show(tmp_path, no_logs):

@@ -25,7 +25,7 @@ COLUMNS = (
     Column("State error", "NRMSE, worst"),
     Column("DEL error", "median"),
     Column("DEL error", "worst"),
-    Column("Worst DEL error at", number=False),
+    Column("Worst DEL error at", number=False, wide=True),
     Column("Verdict", number=False),
 )
 

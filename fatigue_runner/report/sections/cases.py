@@ -9,6 +9,7 @@ from fatigue_runner.results.cells import Row, format_error, format_percent, inte
 from fatigue_runner.results.relevance import relevant_errors
 
 ORDER = 70
+TIME = "Time: of the integration, the case's share of its block, whose cases advance together."
 MOST = 200  # rows on paper; the rest is in results.csv
 
 
@@ -43,8 +44,8 @@ CASE_COLUMNS = (
     Column("Wind", "m/s"),
     Column("Shear", "vertical / horizontal"),
     Column("Seed"),
-    Column("Integrator", number=False),
-    Column("Status", number=False),
+    Column("Integrator", number=False, pick=True),
+    Column("Status", number=False, pick=True),
     Column("Evaluations"),
     Column("Time", "ms"),
     Column("NRMSE", "worst state"),
@@ -55,12 +56,10 @@ CASE_COLUMNS = (
 
 def _all(run: Run) -> list[Block]:
     rows = [row for wind in run.winds for row in wind.rows]
-    caption = "All cases, by wind speed. Every column of every channel is in results.csv."
+    caption = f"All cases, by wind speed. {TIME} Every column of every channel is in results.csv."
     if len(rows) > MOST:
         rows = sorted(rows, key=lambda row: -(_worst(run, row) or 0.0))[:MOST]
-        caption = (
-            f"The {MOST} of {len(run.rows)} cases with the largest DEL error. All of them are in results.csv."
-        )
+        caption = f"The {MOST} of {len(run.rows)} cases with the largest DEL error. {TIME} All of them are in results.csv."
     return [Table(CASE_COLUMNS, [_case(run, row) for row in rows], caption)]
 
 

@@ -30,6 +30,7 @@ def build(run: Run) -> Section:
             "the same ranges.",
         ),
         ("Channels", _channels(run)),
+        ("Model", _model(run)),
         (
             "DEL error",
             "(DEL − DEL_ref) / DEL_ref of the same wind. An error e of the load is about m·e of the damage. Where DEL_ref is below "
@@ -135,6 +136,30 @@ def _channels(run: Run) -> str:
     named = [BY_NAME[c].label if c in BY_NAME else c for c in channels]
     axes = " Axes and signs as OpenFAST's RootMyb/RootMxb (blade root) and TwrBsMyt/TwrBsMxt (tower base)."
     return f"{', '.join(named)}.{axes}" if named else ""
+
+
+def _model(run: Run) -> str:
+    """Which bodies move, by the states whose errors the table has."""
+    states = {
+        str(name).removeprefix("nrmse_")
+        for row in run.rows[:1]
+        for name in row
+        if str(name).startswith("nrmse_")
+    }
+    if "tower_fore_aft" not in states:
+        return ""
+    edge = "one edge mode of each" if "blade1_edge" in states else "one edge mode that the blades share"
+    own = sorted(states & {"filtered_generator_speed", "speed_error_integral", "pitch_actuator_angle"})
+    steered = {
+        "controlled": "under the controller of its file (pitch and torque)",
+        "torque-law": "under its controller's torque at fine pitch",
+    }.get(str(run.setting("operation", "fixed")), "at a fixed pitch")
+    name = run.fact("turbine") or run.setting("turbine", "The turbine")
+    return (
+        f"{name} {steered}: a bending mode of the tower fore-aft and side-side, a flap mode of each blade, {edge}, rotor and "
+        f"generator{', states of the controller' if own else ''}; quasi-steady blade-element momentum theory from tables. Left out: "
+        "higher modes, torsion, yaw, foundation, dynamic stall and wake; docs/model.md says what that costs."
+    )
 
 
 def _reference(run: Run) -> str:

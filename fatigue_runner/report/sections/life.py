@@ -131,8 +131,8 @@ def _place_cells(life: Life, figure: LifeFigure | None) -> list[str]:
 
 def _loads(life: Life, key: Key) -> Table:
     columns = (
-        Column("Channel", number=False),
-        Column("m"),
+        Column("Channel", number=False, pick=True),
+        Column("m", pick=True),
         Column("Lifetime DEL", f"{words.cycles_text(life.section.n_eq)} cycles"),
         Column("Interval", f"{life.section.confidence:.0%} of the seeds"),
         Column("Unit", number=False),

@@ -31,6 +31,7 @@ SHORT = {
     "blade_pitch": "pitch",
     "generator_power": "power",
 }
+DIGITS = {"rotor_speed": 2, "blade_pitch": 2, "generator_power": 0, "rotor_thrust": 1}
 MOST = 24  # mean speeds in the table; a random sweep has hundreds
 WHAT = "Mean of each wind (dots), its standard deviation in time (bars) and its extremes (ticks), over the mean of the wind at hub height"
 
@@ -136,7 +137,10 @@ def _table(rows: list[Row]) -> Table:
         alike = [row for row in rows if number(row, "wind_speed") == speed]
         cells = [f"{speed:.4g}", f"{len(alike)}"]
         for name in CURVES:
-            cells += [_mean(alike, f"{figure}_{name}", BY_NAME[name].scale) for figure in ("mean", "std")]
+            cells += [
+                _mean(alike, f"{figure}_{name}", BY_NAME[name].scale, DIGITS[name])
+                for figure in ("mean", "std")
+            ]
         table.append(TableRow(cells))
     return Table(
         columns,
@@ -145,9 +149,9 @@ def _table(rows: list[Row]) -> Table:
     )
 
 
-def _mean(rows: list[Row], column: str, scale: float) -> str:
+def _mean(rows: list[Row], column: str, scale: float, digits: int) -> str:
     values = [value for row in rows if (value := number(row, column)) is not None]
-    return f"{fmean(values) * scale:,.3g}".replace("e+03", "e3") if values else "–"
+    return f"{fmean(values) * scale:,.{digits}f}" if values else "–"
 
 
 def _draw_histories(run: Run, winds: list[WindCase]) -> str:
