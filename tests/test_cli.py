@@ -191,3 +191,24 @@ def test_an_unknown_turbine_names_the_nearest_one(call):
     code, _, err = call("turbine", "nrel5m")
     assert code == 2
     assert "did you mean 'nrel5mw'" in err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["train", "recipe.yaml", "--out", "taken"],
+        ["benchmark", "work-precision", "--out", "taken"],
+        ["benchmark", "paper", "--out", "taken"],
+        ["benchmark", "kernel", "--json", "no/x.json"],
+        ["turbine", "show", "nrel5mw", "--plot", "no/x.png"],
+        ["turbine", "show", "nrel5mw", "--plot", "x.txt"],
+        ["view", "run", "--save", "no/x.rrd"],
+        ["view", "run", "--save", "x.txt"],
+    ],
+    ids=" ".join,
+)
+def test_commands_refuse_what_they_cannot_write_before_they_begin(command, call, tmp_path):
+    (tmp_path / "taken").write_text("")
+    code, _, said = call(*command)
+    assert code == 2
+    assert any(why in said for why in ("is a file", "is not a folder", "must end in"))

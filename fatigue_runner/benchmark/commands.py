@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
+from fatigue_runner.inputs.files import writable_file, writable_folder
 from fatigue_runner.terminal import command_group, console
 
 app = command_group(
@@ -17,7 +18,14 @@ app = command_group(
 )
 
 Json = Annotated[
-    Path | None, typer.Option("--json", metavar="FILE", help="Write all figures as JSON.", show_default=False)
+    Path | None,
+    typer.Option(
+        "--json",
+        metavar="FILE",
+        help="Write all figures as JSON.",
+        show_default=False,
+        callback=lambda path: writable_file(path, "--json"),
+    ),
 ]
 
 
@@ -106,6 +114,7 @@ def work_precision(
             "-o",
             help="Folder for the pages `work-precision*.md` and their figures.",
             show_default=False,
+            callback=lambda path: writable_folder(path, "--out"),
         ),
     ] = None,
     json: Json = None,
@@ -162,7 +171,13 @@ def paper(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", help="Folder for the page and its figures.", show_default=False),
+        typer.Option(
+            "--out",
+            "-o",
+            help="Folder for the page and its figures.",
+            show_default=False,
+            callback=lambda path: writable_folder(path, "--out"),
+        ),
     ] = None,
     json: Json = None,
 ) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.files import writable_folder
 from fatigue_runner.terminal import command_group, console
 
 if TYPE_CHECKING:
@@ -29,7 +30,14 @@ def train(
         typer.Option("--turbine", "-t", help="Another turbine than the recipe's: a name or a YAML."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder of the result; default: the recipe's.")
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="Folder of the result; default: the recipe's.",
+            show_default=False,
+            callback=lambda path: writable_folder(path, "--out"),
+        ),
     ] = None,
     step: Annotated[float | None, typer.Option("--step", help="Another step [s] than the recipe's.")] = None,
     seed: Annotated[int | None, typer.Option("--seed", help="Another seed than the recipe's.")] = None,

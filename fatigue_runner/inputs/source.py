@@ -183,7 +183,28 @@ def read_mapping(path: Path, what: str, keys: str) -> Source:
         raise InputError(f"{path} is a folder; give the {what}'s YAML file") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
-    return parse_mapping(decoded(data, path, f"a {what} in YAML"), path, what, keys)
+    source = parse_mapping(decoded(data, path, f"a {what} in YAML"), path, what, keys)
+    _refuse_another_kind(source)
+    return source
+
+
+# What only one kind of file has at its top, and which command takes it.
+_KINDS = {
+    "campaign": ("integrators", "`fatigue-runner run`"),
+    "turbine": ("blade", "`turbine:` of a campaign, `fatigue-runner turbine`"),
+    "recipe": ("family", "`fatigue-runner train`"),
+    "polar file": ("airfoils", "`aerodynamics: airfoils:` of a turbine"),
+}
+
+
+def _refuse_another_kind(source: Source) -> None:
+    """A turbine that is given as a campaign has many unknown keys; what is wrong is one thing."""
+    own = _KINDS.get(source.what)
+    if own is None or own[0] in source.data:
+        return
+    for kind, (key, place) in _KINDS.items():
+        if key in source.data:
+            raise InputError(f"{source.name}: this is a {kind}, not a {source.what}; it is for {place}")
 
 
 def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from fatigue_runner.inputs.files import writable_file
 from fatigue_runner.terminal import command_group, console
 
 
@@ -38,7 +39,10 @@ def show(
     plot: Annotated[
         Path | None,
         typer.Option(
-            "--plot", help="Draw the operating curves under the controller into this file (.png, .svg, .pdf)."
+            "--plot",
+            help="Draw the operating curves under the controller into this file (.png, .svg, .pdf).",
+            show_default=False,
+            callback=lambda path: writable_file(path, "--plot", (".png", ".svg", ".pdf")),
         ),
     ] = None,
     write_tables: Annotated[bool, typer.Option("--write-tables", hidden=True)] = False,

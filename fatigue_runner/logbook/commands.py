@@ -233,7 +233,7 @@ def _expand(paths: list[Path]) -> list[Path]:
 def recover(
     log: LogPath,
     to: Annotated[
-        Path | None, typer.Option("--to", help="Write a copy there; default: repair in place.")
+        Path | None, typer.Option("--out", "-o", "--to", help="Write a copy there; default: repair in place.")
     ] = None,
 ) -> None:
     """Repair a log that was cut off or damaged and say what was lost.

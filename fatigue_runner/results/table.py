@@ -150,6 +150,9 @@ def read_results(folder: Path) -> list[dict[str, Any]]:
             )
         return found
     if not table.is_file():
+        if not folder.is_dir():
+            what = "is a file" if folder.exists() else "does not exist"
+            raise InputError(f"{folder} {what}; give the output folder of `fatigue-runner run`")
         raise InputError(f"{folder} holds no results.csv; give the output folder of `fatigue-runner run`")
     try:
         text = decoded(table.read_bytes(), table, "the results table")

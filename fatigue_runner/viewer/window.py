@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.files import writable_file
 
 if TYPE_CHECKING:
     from fatigue_runner.viewer.cases import Viewed
@@ -46,6 +47,7 @@ def view(
     """
     if not 0.0 < scale <= 50.0:
         raise InputError(f"--scale must be above 0 and at most 50, got {scale:g}")
+    writable_file(None if save is None else Path(save), "--save", (".rrd",))
     require_rerun()
     if save is None and not web:
         require_display()

@@ -60,6 +60,10 @@ def import_deck(
     """Write the turbine of an OpenFAST deck (its `.fst`) to `out` (default: the deck's name in this folder), with its airfoils and
     tables beside it. Raises InputError for a deck that cannot be read, and for files that are there already; nothing is written then.
     """
+    if out is None and not deck.is_file():
+        read_deck(deck)  # says what is wrong: a folder, no such file
+    if deck.suffix.lower() in (".yaml", ".yml"):
+        raise InputError(f"{deck} is a YAML file; a deck is named by its .fst file")
     target = out or Path(f"{deck.stem}.yaml")
     if target.suffix.lower() not in (".yaml", ".yml"):
         raise InputError(f"--out {target} must end in .yaml")
