@@ -1,4 +1,4 @@
-"""What the commands of all rooms share: how a group of them is made, and the console that they print to.
+"""What the commands of all rooms share: how a group of them is made, the console that they print to, and where they may write.
 
 A room's commands stand in its `commands.py` as a Typer app named `app`; cli.py mounts it under its name.
 """
@@ -7,11 +7,16 @@ from __future__ import annotations
 
 import codecs
 import io
+import os
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 from typer.core import TyperGroup
+
+from fatigue_runner.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -56,3 +61,42 @@ def console(least: int = 0) -> Console:
     # A file or a pipe has no width; the default of 80 would fold the tables.
     width = made.width if made.is_terminal else 120
     return made if made.is_terminal and width >= least else Console(highlight=False, width=max(width, least))
+
+
+def writable_file(path: Path | None, option: str, endings: Sequence[str] = ()) -> Path | None:
+    """The path of a file that a command will write after long work. Raises InputError before that where it cannot be written.
+
+    option: that names it; endings: of which the name must have one, lower case with the dot; empty: any.
+    """
+    if path is None:
+        return None
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; give {option} the name of a file")
+    if endings and path.suffix.lower() not in endings:
+        raise InputError(f"{option} {path} must end in {' or '.join(endings)}")
+    if not path.parent.is_dir():
+        raise InputError(
+            f"{path} cannot be written: {path.parent} is not a folder; make it first, or give {option} another path"
+        )
+    if not os.access(path if path.exists() else path.parent, os.W_OK):
+        raise InputError(f"{path} cannot be written: you have no right to; give {option} another path")
+    return path
+
+
+def writable_folder(path: Path | None, option: str) -> Path | None:
+    """The same of a folder that is there or will be made."""
+    if path is None:
+        return None
+    there = next((folder for folder in (path, *path.parents) if folder.exists()), Path())
+    if not there.is_dir():
+        raise InputError(f"{there} is a file; give {option} a folder")
+    try:
+        # some file systems (/proc) say that one may write, and do not let anybody
+        probe = there / f".fatigue-runner-{os.getpid()}"
+        probe.mkdir()
+        probe.rmdir()
+    except OSError as error:
+        raise InputError(
+            f"{path} cannot be written ({error.strerror}); give {option} another folder"
+        ) from None
+    return path

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+import os
 import sys
+from pathlib import Path
 
 import pytest
 from campaign_world import CAMPAIGN, build_world, write_campaign
 
 import fatigue_runner
 from fatigue_runner import cli
+from fatigue_runner.errors import InputError
 
 
 @pytest.fixture
@@ -212,3 +215,23 @@ def test_commands_refuse_what_they_cannot_write_before_they_begin(command, call,
     code, _, said = call(*command)
     assert code == 2
     assert any(why in said for why in ("is a file", "is not a folder", "must end in"))
+
+
+def test_what_will_be_written_after_long_work_is_refused_before_it(tmp_path):
+    from fatigue_runner.terminal import writable_file, writable_folder
+
+    (tmp_path / "file").write_text("")
+    assert writable_file(tmp_path / "x.png", "--plot", (".png",)) == tmp_path / "x.png"
+    assert writable_folder(tmp_path / "new" / "deep", "--out") == tmp_path / "new" / "deep"
+    assert writable_file(None, "--json") is writable_folder(None, "--out") is None
+    assert os.listdir(tmp_path) == ["file"], "nothing is left behind"
+    for check, said in (
+        (lambda: writable_file(tmp_path, "--json"), "is a folder; give --json the name of a file"),
+        (lambda: writable_file(tmp_path / "x.txt", "--plot", (".png", ".svg")), "must end in .png or .svg"),
+        (lambda: writable_file(tmp_path / "no" / "x", "--json"), "no is not a folder; make it first, or give --json another path"),
+        (lambda: writable_folder(tmp_path / "file", "--out"), "file is a file; give --out a folder"),
+        (lambda: writable_folder(tmp_path / "file" / "deep", "--out"), "file is a file; give --out a folder"),
+        (lambda: writable_folder(Path("/proc/x"), "--out"), "/proc/x cannot be written"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=said):
+            check()

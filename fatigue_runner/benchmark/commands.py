@@ -10,8 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fatigue_runner.inputs.files import writable_file, writable_folder
-from fatigue_runner.terminal import command_group, console
+from fatigue_runner.terminal import command_group, console, writable_file, writable_folder
 
 app = command_group(
     "Measure the kernel, every integrator's error over cost, the paper's experiment, the logs; each in one run."

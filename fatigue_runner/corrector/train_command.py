@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.files import writable_folder
-from fatigue_runner.terminal import command_group, console
+from fatigue_runner.terminal import command_group, console, writable_folder
 
 if TYPE_CHECKING:
     from rich.console import Console

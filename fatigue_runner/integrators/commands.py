@@ -8,8 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from fatigue_runner.inputs.files import writable_file
-from fatigue_runner.terminal import command_group, console
+from fatigue_runner.terminal import command_group, console, writable_file
 
 
 class _ShowByDefault(TyperGroup):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.files import writable_file
+from fatigue_runner.terminal import writable_file
 
 if TYPE_CHECKING:
     from fatigue_runner.viewer.cases import Viewed

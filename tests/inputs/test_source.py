@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.files import to_yaml, writable_file, writable_folder, write_atomically
+from fatigue_runner.inputs.files import to_yaml, write_atomically
 from fatigue_runner.inputs.source import Place, Source, parse_mapping, read_mapping
 
 
@@ -153,21 +152,3 @@ def test_a_file_of_another_kind_is_told_as_what_it_is(tmp_path, asked, given):
         return
     with pytest.raises(InputError, match=f"a.yaml: this is a {given}, not a {asked}; it is for `"):
         read_mapping(tmp_path / "a.yaml", asked, "")
-
-
-def test_what_will_be_written_after_long_work_is_refused_before_it(tmp_path):
-    (tmp_path / "file").write_text("")
-    assert writable_file(tmp_path / "x.png", "--plot", (".png",)) == tmp_path / "x.png"
-    assert writable_folder(tmp_path / "new" / "deep", "--out") == tmp_path / "new" / "deep"
-    assert writable_file(None, "--json") is writable_folder(None, "--out") is None
-    assert os.listdir(tmp_path) == ["file"], "nothing is left behind"
-    for check, said in (
-        (lambda: writable_file(tmp_path, "--json"), "is a folder; give --json the name of a file"),
-        (lambda: writable_file(tmp_path / "x.txt", "--plot", (".png", ".svg")), "must end in .png or .svg"),
-        (lambda: writable_file(tmp_path / "no" / "x", "--json"), "no is not a folder; make it first, or give --json another path"),
-        (lambda: writable_folder(tmp_path / "file", "--out"), "file is a file; give --out a folder"),
-        (lambda: writable_folder(tmp_path / "file" / "deep", "--out"), "file is a file; give --out a folder"),
-        (lambda: writable_folder(Path("/proc/x"), "--out"), "/proc/x cannot be written"),
-    ):  # fmt: skip
-        with pytest.raises(InputError, match=said):
-            check()
