@@ -134,7 +134,9 @@ def to_svg(figure: Figure) -> str:
 
 def _freeze_layout(figure: Figure) -> None:
     """Lay the figure out once, on a grid: the solver's last bits differ from run to run, and they name clip paths."""
-    figure.draw_without_rendering()
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
     figure.set_layout_engine("none")
     for axes in figure.axes:
         left, bottom, width, height = (round(value, 6) for value in axes.get_position().bounds)

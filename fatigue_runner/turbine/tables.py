@@ -144,7 +144,10 @@ class AeroTables:
             raise InputError(
                 "pitch varying in time needs aerodynamic tables at four or more pitches, at multiples of one step"
             )
-        nodes = np.stack([self._powers(self.at_pitch(p, names), len(names)) for p in self.pitch])
+        # at a pitch of the table a spline through its values is the value, but for the last, which lies at the end of a piece
+        stack = np.stack([self.coefficient(name) for name in names], axis=-1)
+        values = [*(stack[:, i] for i in range(len(self.pitch) - 1)), self.at_pitch(self.pitch[-1], names)]
+        nodes = np.stack([self._powers(at, len(names)) for at in values])
         parts = self._along(nodes, self.pitch)
         count = round(float(self.pitch[-1] - self.pitch[0]) / step)
         starts = self.pitch[0] + step * np.arange(count)
