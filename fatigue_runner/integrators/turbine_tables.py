@@ -101,6 +101,10 @@ _GAINS = ("proportional_gain", "integral_gain", "gain_schedule_pitch_deg")
 CURVE = (4.0, 6.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0)  # m/s
 
 
+# m/s; the tips of large turbines reach 70 to 105 at rated speed
+FASTEST_TIPS = 110.0
+
+
 def print_imported(made: Imported, console: Console) -> None:
     """A turbine that was imported from a deck: its masses, modes and operating curve, what was decided, what "
     "is left out, what comes next."""
@@ -160,6 +164,8 @@ def _curve(turbine: Turbine) -> Table:
         except InputError:
             table.add_row(f"{wind:g}", *["-"] * (2 + len(names)))
             continue
+        if mode == FIXED and values["rotor_speed"] * turbine.rotor_radius > FASTEST_TIPS:
+            break
         power = values["generator_torque"] * values["generator_speed"] / 1e3
         pitch = np.degrees(values.get("pitch", 0.0))
         table.add_row(
@@ -171,7 +177,9 @@ def _curve(turbine: Turbine) -> Table:
     table.caption = (
         "under its controller"
         if mode == CONTROLLED
-        else "at zero pitch, there is no controller; -: no steady rotation"
+        else f"at zero pitch: there is no controller, so nothing holds speed and power, which grow beyond what the machine is rated for; "
+        f"left out where the tips are faster than {FASTEST_TIPS:g} m/s; -: no steady rotation; a section `control` gives the rest "
+        "(docs/turbines.md)"
     )
     return table
 

@@ -99,3 +99,18 @@ def test_a_drawing_that_cannot_be_is_refused_in_one_sentence(tmp_path):
         draw("toy", [1.0, 2.0], {name: np.zeros(2) for name in CHANNELS}, tmp_path / "nowhere" / "a.png")
     with pytest.raises(InputError, match="t2b1i1cg has no `control` section"):
         print_turbine("t2b1i1cg", [8.0], 0.0, Console(quiet=True), tmp_path / "a.png")
+
+
+def test_the_curve_of_a_turbine_without_a_controller_ends_where_no_machine_turns():
+    from fatigue_runner.integrators.turbine_tables import FASTEST_TIPS, _curve
+    from fatigue_runner.turbine import load_turbine
+    from fatigue_runner.turbine.file import read_turbine_file
+
+    data = read_turbine_file("nrel5mw")
+    law = {"law": "optimal", "optimal_gain": data["generator"]["optimal_gain"]}
+    curve = _curve(load_turbine(data | {"control": None, "generator": law}))
+    winds = [float(wind) for wind in curve.columns[0].cells]
+    speeds = [float(speed) for speed in curve.columns[3].cells]
+    assert 8.0 in winds and 25.0 not in winds
+    assert max(speeds) * 3.1416 / 30 * 63.0 < FASTEST_TIPS
+    assert "there is no controller, so nothing holds speed and power" in str(curve.caption)

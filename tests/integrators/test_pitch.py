@@ -192,3 +192,19 @@ def test_a_schedule_that_makes_no_sense_is_refused_in_one_sentence(change, messa
         make_plan(CAMPAIGN | change)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("which", ["time", "angle"])
+def test_a_masked_sample_of_a_pitch_series_is_refused(which):
+    given = {"time": [0.0, 1.0, 2.0], "angle": [0.0, 0.1, 0.2]}
+    given[which] = np.ma.array(given[which], mask=[False, True, False])
+    with pytest.raises(InputError, match=f"pitch series: {which} is masked at index 1"):
+        fr.PitchSeries(**given)
+
+
+def test_a_masked_initial_state_is_refused():
+    turbine = fr.load_turbine("nrel5mw")
+    state = np.ma.array(turbine.operating_point(8.0))
+    state[3] = np.ma.masked
+    with pytest.raises(InputError, match="initial is masked at index 3"):
+        fr.simulate(turbine, wind=fr.ConstantWind(8.0), method="rk4", step=0.05, duration=1.0, initial=state)
