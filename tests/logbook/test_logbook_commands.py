@@ -67,6 +67,18 @@ def test_summary_gives_extremes_with_their_times_and_counts_what_is_not_finite(t
     assert thrust.mean == 13 / 10
 
 
+def test_extremes_leave_out_the_start_that_the_campaign_discards(tmp_path):
+    trajectory = guarded([])
+    trajectory.loads = {"rotor_thrust": np.array([90, 5, -50, 9, 1, 2, 0, 0, 0, 0, 3], float)}
+    path = write_log(tmp_path / "a.mcap", trajectory, RUN | {"discard": "3"})
+    thrust = summarise(path).extremes[0]
+    assert (thrust.minimum, thrust.maximum, thrust.time_of_maximum) == (0, 9, 3)
+    assert "extremes after the first 3 s, which do not count" in logs("info", path)[1]
+    # a case that ended before the counted time has nothing else to show
+    ended = write_log(tmp_path / "b.mcap", trajectory, RUN | {"discard": "20"})
+    assert summarise(ended).extremes[0].maximum == 90
+
+
 # --- info
 # -------------------------------------------------------------------------------------------------------
 

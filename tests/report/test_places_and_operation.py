@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 
+import numpy as np
 import pytest
-from report_example import CAMPAIGN, example_rows, write_run
+from report_example import CAMPAIGN, ExampleLog, example_rows, write_run
 
-from fatigue_runner.channels import sections
+from fatigue_runner.channels import STATE_NAMES, sections
 from fatigue_runner.report import rundata
 from fatigue_runner.report.rundata import load_run
-from fatigue_runner.report.sections import beam_sections, operation
+from fatigue_runner.report.sections import beam_sections, histories, operation
 
 CURVE = {
     "wind_speed": [5.0, 10.0], "rotor_speed": [0.7, 1.2], "blade_pitch": [0.0, 0.1], "generator_power": [5e5, 4e6],
@@ -63,6 +64,15 @@ def test_a_fixed_pitch_has_no_operation_to_show(tmp_path, no_logs):
     assert operation.build(run_of(tmp_path, rows, CAMPAIGN | {"operation": "fixed"})) is None
     bare = example_rows(diverging=False)
     assert operation.build(run_of(tmp_path, bare, CAMPAIGN | {"operation": "controlled"})) is None
+
+
+def test_logs_of_a_few_channels_cost_no_page(tmp_path, monkeypatch):
+    """The histories need a state that such logs do not hold."""
+    log = ExampleLog(np.arange(100.0), np.full((100, len(STATE_NAMES)), np.nan), {})
+    monkeypatch.setattr(rundata, "_read_log", lambda path: log)
+    write_run(tmp_path, example_rows(diverging=False), CAMPAIGN)
+    section = histories.build(load_run(tmp_path))
+    assert section.blocks[0].text == "Not drawn: the run folder has no readable logs of the tower's motion."
 
 
 def test_sections_stand_over_height_radius_and_direction(tmp_path, no_logs):

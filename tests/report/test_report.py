@@ -221,7 +221,10 @@ def test_text_of_the_user_cannot_become_markup(tmp_path):
 
 
 def test_a_run_without_logs_says_why_it_has_no_time_histories(folder):
-    assert section_text("histories", folder) == "Not drawn: the run folder has no readable logs."
+    assert (
+        section_text("histories", folder)
+        == "Not drawn: the run folder has no readable logs of the tower's motion."
+    )
 
 
 def test_an_unreadable_log_leaves_out_its_curve_and_nothing_else(tmp_path, rows, monkeypatch):

@@ -33,7 +33,7 @@ def build(run: Run) -> Section:
         why = (
             "the campaign has no reference"
             if run.reference is None
-            else "the run folder has no readable logs"
+            else "the run folder has no readable logs of the tower's motion"
         )
         return Section(title, [Paragraph(f"Not drawn: {why}.")])
     shown = shown_integrators(run)
