@@ -16,9 +16,10 @@ def turbine():
     return load_turbine("nrel5mw")
 
 
-def wind(speed=8.0, seed=4, duration=40.0):
-    """Three signals, as the shipped correctors were trained on."""
-    found = TurbulentWind(speed, intensity=0.14, seed=9_100_000 + seed, duration=duration, harmonics=1)
+def wind(speed=8.0, seed=4, duration=40.0, harmonics=1):
+    found = TurbulentWind(
+        speed, intensity=0.14, seed=9_100_000 + seed, duration=duration, harmonics=harmonics
+    )
     return found.on(turbine().rotor)
 
 
@@ -29,8 +30,8 @@ def start(off=True):
     return x
 
 
-def runs(name, step, corrector=None, mode="enhanced", duration=40.0):
-    blowing = [wind(v, i, duration) for i, v in enumerate((5.5, 7.0, 8.5, 9.5))]
+def runs(name, step, corrector=None, mode="enhanced", duration=40.0, harmonics=1):
+    blowing = [wind(v, i, duration, harmonics) for i, v in enumerate((5.5, 7.0, 8.5, 9.5))]
     x = np.array([turbine().operating_point(w.mean_speed) for w in blowing])
     return simulate_block(
         turbine(), name, step, blowing, x, duration - 1, 0.6, corrector=corrector, mode=mode
@@ -38,13 +39,13 @@ def runs(name, step, corrector=None, mode="enhanced", duration=40.0):
 
 
 @cache
-def truth():
-    return runs("dop853", 0.02)
+def truth(harmonics=1):
+    return runs("dop853", 0.02, harmonics=harmonics)
 
 
-def error(found) -> float:
+def error(found, harmonics=1) -> float:
     out = []
-    for run, true in zip(found, truth(), strict=True):
+    for run, true in zip(found, truth(harmonics), strict=True):
         assert run.diverged_at is None
         away = np.sqrt(((run.state - true.state) ** 2).mean(axis=0))
         out.append(float((away / np.ptp(true.state, axis=0)).max()))

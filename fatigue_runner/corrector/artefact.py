@@ -20,9 +20,11 @@ from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.maps import MAPS, map_class
 from fatigue_runner.encoded import refuse_pointer
 from fatigue_runner.layout import FAMILIES, T2B1I1CG, Channel, FirstOrder, Layout, family_of
+from fatigue_runner.turbine.turbine import FIXED
 
 FORMAT = "fatigue-runner corrector 1"
 _FACTS = ("wind_range", "validation", "training", "recipe", "licence")
+_BOUND = ("turbine", "turbine_hash", "method", "step")
 _NOTHING: dict[str, Any] = {
     "factors": (),
     "activation": "identity",
@@ -81,6 +83,10 @@ def _layout(header: dict[str, Any]) -> Layout:
     )
 
 
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
+
+
 def load(path: Path | str) -> Corrector:
     """Read a corrector. Raises CorrectorError for a file that is cut, of another kind, or incomplete."""
     from safetensors import SafetensorError, safe_open
@@ -111,7 +117,7 @@ def load(path: Path | str) -> Corrector:
 def _corrector(header: dict[str, Any], tensors: dict[str, Any]) -> Corrector:
     if header["kind"] not in MAPS:
         from fatigue_runner.corrector import families  # noqa: F401 - a family may bring a map of its own
-    guard: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in header["guard"].items()}
+    guard: dict[str, Any] = {k: _tuples(v) for k, v in header["guard"].items()}
     try:
         kind = map_class(header["kind"])
     except CorrectorError as error:
@@ -120,7 +126,7 @@ def _corrector(header: dict[str, Any], tensors: dict[str, Any]) -> Corrector:
     return Corrector(
         header["name"],
         header["family"],
-        Binding(*(header[key] for key in ("turbine", "turbine_hash", "method", "step"))),
+        Binding(operation=header.get("operation", FIXED), **{key: header[key] for key in _BOUND}),
         kind.read(header, tensors, _layout(header)),
         Guard(**guard, ahead_atol=tuple(header.get("ahead_atol", ()))),
         **{**facts, "wind_range": tuple(facts["wind_range"])},

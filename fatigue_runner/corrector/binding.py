@@ -20,7 +20,7 @@ SAME_STEP = 1e-9  # relative
 
 @dataclass(frozen=True)
 class Binding:
-    """A turbine by the hash of its equations, parameters and tables; the name of a method; its step [s].
+    """A turbine by the hash of its equations, parameters and tables; the name of a method; its step [s]; the turbine's operation.
 
     Raises InputError for a method that no correctors are made for.
     """
@@ -29,13 +29,14 @@ class Binding:
     turbine_hash: str
     method: str
     step: float
+    operation: str = FIXED
 
     def __post_init__(self) -> None:
         correctable(self.method)
 
     @classmethod
     def to(cls, turbine: Turbine, method: str, step: float) -> Binding:
-        return cls(turbine.name, turbine.hash, method, step)
+        return cls(turbine.name, turbine.hash, method, step, turbine.operation)
 
     @property
     def found(self) -> Method:
@@ -50,10 +51,11 @@ class Binding:
     def refusal(self, turbine: Turbine, method: str, step: float) -> str:
         """Why the corrector does not fit a run, and the way out; empty where it fits."""
         if turbine.hash != self.turbine_hash:
-            if turbine.operation != FIXED and turbine.operated(FIXED).hash == self.turbine_hash:
+            if self._fits_operated_otherwise(turbine):
+                here = f"`operation: {turbine.operation}`"
                 return (
-                    f"was trained for {self.turbine} at fixed pitch, under operation {turbine.operation!r} the equations are others; "
-                    f"leave it out (recipes do not know operations yet), or use `operation: {FIXED}`"
+                    f"was trained for {self.turbine} with `operation: {self.operation}`, the run has {here} and other equations; "
+                    f"use one for {turbine.operation} (`fatigue-runner correctors list`), or train one with {here} in its recipe"
                 )
             file = turbine.file or "FILE"
             return (
@@ -73,10 +75,15 @@ class Binding:
         """How far a turbine is from the one of the training, where that is shipped and unchanged."""
         try:
             trained = load_turbine(self.turbine).operated(turbine.operation)
+            known = self.turbine_hash in (trained.hash, trained.operated(self.operation).hash)
         except InputError:
             return ""
-        known = self.turbine_hash in (trained.hash, trained.operated(FIXED).hash)
         return f", which differs in {apart(turbine, trained)}" if known else ""
+
+    def _fits_operated_otherwise(self, turbine: Turbine) -> bool:
+        if turbine.operation == self.operation or (self.operation != FIXED and turbine.control is None):
+            return False
+        return turbine.operated(self.operation).hash == self.turbine_hash
 
 
 def correctable(method: str) -> Method:

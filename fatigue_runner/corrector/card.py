@@ -21,17 +21,15 @@ _LABELS = {
 def summary(corrector: Corrector) -> list[tuple[str, str]]:
     """(label, value) pairs of what a person asks first."""
     guard = corrector.guard
-    fallback = (
-        f"{guard.substeps} substeps of {corrector.method}"
-        if guard.substeps
-        else "the method of the next order"
-    )
-    if corrector.past:
-        fallback = f"{corrector.method} as it is"
+    fallback = "the method of the next order"
+    if corrector.fallback is not None:
+        own = "steps" if corrector.past else "substeps"
+        fallback = f"{guard.substeps} {own} of {corrector.fallback[0]}"
     sizes = [" x ".join(map(str, weights.shape)) for weights in corrector.map.tensors().values()]
     return [
         ("family", corrector.family),
         ("turbine", f"{corrector.turbine} ({corrector.turbine_hash[:12]})"),
+        ("operation", corrector.binding.operation),
         ("method, step", f"{corrector.method}, {corrector.step * 1e3:g} ms"),
         ("features", corrector.map.sees),
         ("weights", ", ".join(sizes)),

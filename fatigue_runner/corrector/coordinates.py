@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.integrators import multi_blade
-from fatigue_runner.layout import Layout
+from fatigue_runner.integrators.linear_part import LINEARISED_AT
+from fatigue_runner.layout import BLADES, Layout
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
+    from fatigue_runner.turbine.lanes import KernelData
+    from fatigue_runner.wind import WindSource
 
 Array = NDArray[np.float64]
 Turn = tuple[Array, Array]  # cosine and sine (n,) of the azimuth
@@ -36,13 +39,43 @@ def relative(layout: Layout, x: Array, ratio: float) -> Array:
     )
 
 
+def blown(turbine: Turbine, wind: WindSource, times: Array, rows: int = 0) -> Array:
+    """(n, rows) signals of a wind at times (n,) [s] as the kernels read them: those of the layout, then wind across and harmonics where
+    there are any. rows: at least so many, as another wind has."""
+    out = np.zeros((len(times), max(rows, turbine.layout.wind_size(wind.channels))))
+    out[:, turbine.layout.wind_rows(wind.channels)] = wind.at(times)
+    return out
+
+
+def of_harmonics(layout: Layout, x: Array, ahead: float, harmonics: Array) -> Array:
+    """(n, 3) mean, cosine and sine part over the blades of azimuthal harmonics (n, 2 M) [m/s], where the blades stand `ahead` [s] of the
+    states x (n, size) at their speed."""
+    azimuth = x[:, layout.rotor] + ahead * x[:, layout.rotor_speed]
+    blades = np.zeros((len(x), BLADES))
+    angles = azimuth[:, None] + np.arange(BLADES) * 2 * np.pi / BLADES
+    for i in range(harmonics.shape[1] // 2):
+        for part, turned in ((0, np.cos), (1, np.sin)):
+            blades += harmonics[:, [2 * i + part]] * turned((i + 1) * angles)
+    parts = (
+        blades.sum(axis=1) / BLADES,
+        *(2 / BLADES * (blades * f(angles)).sum(axis=1) for f in (np.cos, np.sin)),
+    )
+    return np.stack(parts, axis=1)
+
+
+def kernel(turbine: Turbine, rows: int) -> KernelData:
+    """What the kernels read of the turbine for wind of so many rows."""
+    return turbine.kernel_data(0.0, harmonics=rows > len(turbine.layout.wind))
+
+
 def slopes(turbine: Turbine, x: Array, wind: Array) -> Array:
-    """(n, k) accelerations of states (n, size) under wind (n, signals), the twist's in place of the generator's; then slopes of the
-    first-order states."""
+    """(n, k) accelerations of states (n, size) under wind (n, rows), see `blown`, the twist's in place of the generator's; then slopes
+    of the first-order states."""
     from fatigue_runner.turbine.lanes import evaluate
 
     layout = turbine.layout
-    slope = evaluate(turbine.kernel_data(0.0), np.ascontiguousarray(x.T), np.ascontiguousarray(wind.T))[0].T
+    columns, signals = np.ascontiguousarray(x.T), np.ascontiguousarray(wind.T)
+    slope = evaluate(kernel(turbine, len(signals)), columns, signals)[0].T
     out = slope[:, layout.freedoms :].copy()
     out[:, layout.generator] = (
         slope[:, layout.rotor_speed] - slope[:, layout.generator_speed] / turbine.gearbox_ratio
@@ -50,9 +83,11 @@ def slopes(turbine: Turbine, x: Array, wind: Array) -> Array:
     return np.asarray(out)
 
 
-def nonlinear_part(turbine: Turbine, x: Array, wind: Array, damping: float) -> Array:
-    """(n, k) slopes without their linear part; damping [1/s]: see `multi_blade.linear`."""
-    linear = multi_blade.linear(turbine, 0.0, damping).low
+def nonlinear_part(
+    turbine: Turbine, x: Array, wind: Array, damping: float, point: float = LINEARISED_AT
+) -> Array:
+    """(n, k) slopes without their linear part; damping [1/s], point [m/s]: see `multi_blade.linear`."""
+    linear = multi_blade.linear(turbine, 0.0, damping, point).low
     return np.asarray(
         slopes(turbine, x, wind) - relative(turbine.layout, x, turbine.gearbox_ratio) @ linear.T
     )

@@ -13,6 +13,8 @@ from fatigue_runner.corrector.binding import Binding
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.maps import Map
+from fatigue_runner.corrector.maps.map import Run
+from fatigue_runner.integrators.tableaux import RK4
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
@@ -85,6 +87,13 @@ class Corrector:
     def damping(self) -> float:
         return self.map.damping
 
+    @property
+    def fallback(self) -> tuple[str, float] | None:
+        """Method and step [s] that make what the guard refuses; None: the method of the next order that shares the stages."""
+        if not self.guard.substeps:
+            return None
+        return RK4.name if self.past else self.method, self.step / self.guard.substeps
+
     def bind(self, turbine: Turbine, method: str, step: float) -> None:
         """Raises CorrectorError unless it was trained for this turbine, method and step [s]."""
         refusal = self.binding.refusal(turbine, method, step)
@@ -98,9 +107,11 @@ class Corrector:
         if refusal:
             raise CorrectorError(f"corrector {self.name} {refusal}")
 
-    def map_data(self, turbine: Turbine, pitch: float = 0.0) -> NamedTuple:
-        """What the compiled loop reads of the map."""
-        return self.map.data(self.binding, turbine, pitch)
+    def map_data(
+        self, turbine: Turbine, pitch: float = 0.0, speed: float = 0.0, harmonics: bool = False
+    ) -> NamedTuple:
+        """What the compiled loop reads of the map; see `integrators.protocol.StepCorrector`."""
+        return self.map.data(self.binding, turbine, Run(pitch, speed, harmonics))
 
     def predict(self, sampled: Any) -> Array:
         """Defects (n, states) [state units] of sampled steps, as the kernel computes them."""

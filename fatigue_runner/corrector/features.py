@@ -17,6 +17,7 @@ MULTI_BLADE_FACTORS = ("wind_speed@start", "rotor_speed")
 DRIVE = ("generator_azimuth", "rotor_speed", "generator_speed")
 
 MOST_HISTORY = 4  # steps
+_TIMES = ("start", "middle", "end")
 MOST_ROWS = 512  # room of the compiled loop for features and their products
 
 
@@ -41,7 +42,7 @@ def _slopes(layout: Layout) -> tuple[str, ...]:
 
 
 def _winds(layout: Layout) -> tuple[str, ...]:
-    return tuple(f"{w.name}@{at}" for at in ("start", "middle", "end") for w in layout.wind)
+    return tuple(f"{w.name}@{at}" for at in _TIMES for w in layout.wind)
 
 
 def stage_aware(layout: Layout, stages: int, history: int = 0) -> tuple[str, ...]:
@@ -59,7 +60,8 @@ def raw(layout: Layout) -> tuple[str, ...]:
 
 def multi_blade(layout: Layout, past: int) -> tuple[str, ...]:
     """What a step of an exponential Adams method sees: blades by the mean, cosine and sine part over the azimuth; the wind's shears
-    times its speed; `past` earlier nonlinear parts of the accelerations, the newest first, and the one at the step's predicted end."""
+    times its speed; where the layout has azimuthal harmonics what the blades feel of them; `past` earlier nonlinear parts of the
+    accelerations, the newest first, and the one at the step's predicted end."""
 
     def blades(values: tuple[str, ...]) -> tuple[str, ...]:
         turned = {"blade1": "mean", "blade2": "cosine", "blade3": "sine"}
@@ -68,7 +70,13 @@ def multi_blade(layout: Layout, past: int) -> tuple[str, ...]:
 
     places = (*(f"step-{i}" if i else "start" for i in range(past)), "end")
     parts = tuple(f"nonlinear_{slope}@{place}" for place in places for slope in blades(_slopes(layout)))
-    return ("one", *blades(_relative(layout)), *_winds(layout), *parts)
+    felt = tuple(
+        f"{part}_harmonic_wind@{at}"
+        for at in _TIMES
+        for part in ("mean", "cosine", "sine")
+        if layout.harmonics
+    )
+    return ("one", *blades(_relative(layout)), *_winds(layout), *felt, *parts)
 
 
 def factor_rows(layout: Layout, factors: tuple[str, ...]) -> tuple[int, ...]:

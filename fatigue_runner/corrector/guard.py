@@ -17,7 +17,9 @@ class Guard:
     next order that shares the stages, else the fallback is that many smaller steps of the method itself.
     low, high: bounds of the features behind the leading 1, without factors; a step whose features leave them is refused, whatever its
     distance. Empty: no bounds. They are the extent of the training and validation samples, and `margin` times it on both sides.
-    ahead_atol (states,): atol for what an exponential Adams method predicts, in the units of the same limit; empty for other methods.
+    ahead_atol (states,): atol of the distance from what an exponential Adams method has predicted, in the units of the same limit; empty
+    for other methods.
+    Its steps that are refused are made anew in `substeps` of RK4.
     """
 
     limit: float
@@ -50,6 +52,8 @@ class Guard:
 
     def check(self, states: int, predicts: bool) -> None:
         """Raises CorrectorError unless there is a unit for each of so many states, and for their prediction where there is one."""
+        if predicts and not self.substeps:
+            raise CorrectorError("its guard needs substeps for the steps that it refuses; train it anew")
         for name, values in (("atol", self.atol), ("rtol", self.rtol)):
             if len(values) != states:
                 raise CorrectorError(

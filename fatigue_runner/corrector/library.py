@@ -26,14 +26,17 @@ def files(more: Sequence[Path] = ()) -> dict[str, Path]:
 class Correctors(list[Corrector]):
     """A list that reads as a table: what each is for, and its median error under winds that it was not trained on."""
 
-    COLUMNS = ("name", "family", "turbine", "method", "step [ms]", "plain", "enhanced", "hybrid")
-    FIGURES = COLUMNS[4:]
+    COLUMNS = ("name", "family", "turbine", "operation", "method", "step [ms]", "plain", "enhanced", "hybrid")
+    FIGURES = COLUMNS[5:]
     NOTE = "plain, enhanced, hybrid: median NRMSE over winds that were not trained on; - : diverged or not measured"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Texts of `COLUMNS`, one row per corrector."""
         return [
-            (c.name, c.family, c.turbine, c.method, f"{c.step * 1e3:g}", *(_error(c, mode) for mode in self.FIGURES[1:]))
+            (
+                c.name, c.family, c.turbine, c.binding.operation, c.method, f"{c.step * 1e3:g}",
+                *(_error(c, mode) for mode in self.FIGURES[1:]),
+            )
             for c in self
         ]  # fmt: skip
 

@@ -4,6 +4,7 @@ name          of the artefact: `NAME.safetensors` beside the recipe
 family        what is learned and how: `fatigue_runner/corrector/families/` has a file for each, with the keys of its own
 description   for people
 turbine       `nrel5mw`, `t2b1i1cg` or the path of a turbine YAML
+operation     `fixed` pitch (default), `controlled` or `torque-law`: who steers the turbine, as in a campaign
 method, step  the method that is corrected and its step [s]
 initial       state at the start of every trajectory: `operating-point`, `paper` or `paper-spinning`
 """
@@ -26,6 +27,7 @@ from fatigue_runner.corrector.fit import relative_residual
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.section import TAG, Section, known_name, problem
 from fatigue_runner.integrators.initial import INITIAL_STATES, initial_state
+from fatigue_runner.turbine.turbine import FIXED, OPERATIONS
 from fatigue_runner.wind.section import Harmonics
 
 if TYPE_CHECKING:
@@ -77,6 +79,7 @@ class Recipe(Section):
     family: str
     description: str = ""
     turbine: str = "nrel5mw"
+    operation: str = FIXED
     method: str
     step: float = Field(gt=0, le=1)
     initial: str = "operating-point"
@@ -113,6 +116,11 @@ class Recipe(Section):
     def _known_state(cls, value: str) -> str:
         return known_name(value, INITIAL_STATES)
 
+    @field_validator("operation")
+    @classmethod
+    def _known_operation(cls, value: str) -> str:
+        return known_name(value, OPERATIONS)
+
     @field_validator("method")
     @classmethod
     def _correctable(cls, value: str) -> str:
@@ -121,6 +129,12 @@ class Recipe(Section):
         except InputError as error:
             raise problem(str(error)) from None
         return value
+
+    def load_turbine(self) -> Turbine:
+        """The turbine as it is operated. Raises InputError for one that cannot be so."""
+        from fatigue_runner.turbine import load_turbine
+
+        return load_turbine(self.turbine).operated(self.operation)
 
     def starts(self, turbine: Turbine, winds: Sequence[Any]) -> Array:
         """(n, states) initial states."""
@@ -184,11 +198,18 @@ Speeds = Annotated[
 ]
 
 
+def speeds_of(speeds: Spread | list[float]) -> list[float]:
+    """As a list [m/s]."""
+    if isinstance(speeds, Spread):
+        return [float(v) for v in np.linspace(speeds.start, speeds.stop, speeds.count)]
+    return speeds
+
+
 class Winds(Section):
     """`type: constant` with `speeds`, `vertical_shear`, `horizontal_shear` (lists, every combination), or `type: turbulent` with
     `speeds: {start, stop, count}`, `intensity: [low, high]`, `shear_exponent: [low, high]`, `seed`: one wind per speed, the two drawn,
     over a rotor of 63 m with its hub at 90 m whatever the turbine, so that a shipped recipe gives the shipped corrector; `harmonics`:
-    azimuthal ones of turbulence (default 1: mean and linear shears); `duration` [s]."""
+    azimuthal ones of turbulence (default 1: mean and linear shears), or a list of numbers that the winds have in turn; `duration` [s]."""
 
     type: Literal["constant", "turbulent"] = "turbulent"
     speeds: Speeds
@@ -197,14 +218,17 @@ class Winds(Section):
     vertical_shear: list[float] = Field(default=[0.0])
     horizontal_shear: list[float] = Field(default=[0.0])
     seed: int = Field(default=0, ge=0)
-    harmonics: Harmonics = 1
+    harmonics: Harmonics | Annotated[list[Harmonics], Field(min_length=1)] = 1
     duration: float = Field(default=120.0, ge=2, le=1e4)
 
     @property
     def speed_list(self) -> list[float]:
-        if isinstance(self.speeds, Spread):
-            return [float(v) for v in np.linspace(self.speeds.start, self.speeds.stop, self.speeds.count)]
-        return self.speeds
+        return speeds_of(self.speeds)
+
+    @property
+    def harmonics_list(self) -> list[int]:
+        """Numbers of azimuthal harmonics that the winds have in turn."""
+        return self.harmonics if isinstance(self.harmonics, list) else [self.harmonics]
 
     def build(self) -> list[Any]:
         """The wind sources."""
@@ -215,12 +239,12 @@ class Winds(Section):
                 ConstantWind(v, kv, kh)
                 for v in self.speed_list for kv in self.vertical_shear for kh in self.horizontal_shear
             ]  # fmt: skip
-        rng = np.random.Generator(np.random.PCG64(self.seed))
+        rng, harmonics = np.random.Generator(np.random.PCG64(self.seed)), self.harmonics_list
         return [
             TurbulentWind(
                 v, intensity=float(rng.uniform(*self.intensity)), shear_exponent=float(rng.uniform(*self.shear_exponent)),
                 seed=100_000 + 1000 * self.seed + number, duration=self.duration,
-                rotor_radius=63.0, hub_height=90.0, harmonics=self.harmonics,
+                rotor_radius=63.0, hub_height=90.0, harmonics=harmonics[number % len(harmonics)],
             )
             for number, v in enumerate(self.speed_list)
         ]  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fatigue_runner.corrector import features
-from fatigue_runner.corrector.coordinates import slopes
+from fatigue_runner.corrector.coordinates import blown, kernel, slopes
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import Ensemble, Integrator, simulate
 from fatigue_runner.integrators import method as find_method
@@ -56,14 +56,14 @@ class Samples:
         return np.concatenate([self.rows, *more], axis=1) if more else self.rows
 
 
-def wind_pieces(wind: Any, times: Array, step: float, count: int = 1) -> Array:
-    """(n, count, 4, signals) cubic coefficients in time of `count` equal pieces of the steps that begin at `times` (n,) [s].
+def wind_pieces(turbine: Turbine, wind: Any, times: Array, step: float, count: int = 1) -> Array:
+    """(n, count, 4, rows) cubic coefficients in time of `count` equal pieces of the steps that begin at `times` (n,) [s].
 
     Exact where the wind is cubic over each piece; see `pieces_of`.
     """
     u, length = np.array([0.0, 1 / 3, 2 / 3, 1.0]), step / count
     powers = np.linalg.inv(np.vander(u, 4, increasing=True)) / length ** np.arange(4)[:, None]
-    values = (np.stack([wind.at(times + (i + x) * length) for x in u]) for i in range(count))
+    values = (np.stack([blown(turbine, wind, times + (i + x) * length) for x in u]) for i in range(count))
     return np.stack([np.einsum("pk,kns->nps", powers, v) for v in values], axis=1)
 
 
@@ -105,7 +105,7 @@ def single_steps(
     width, seen = len(features.stage_aware(layout, stages)), len(features.raw(layout))
     rows, raw = np.empty((len(x), width * LANES)), np.empty((len(x), seen * LANES))
     plain, exact = np.empty_like(x), np.empty_like(x)
-    data = turbine.kernel_data(0.0)
+    data = kernel(turbine, pieces.shape[3])
     step_samples(
         data.model, x, cells, step / count, own, stage_rows(stages), step, finer, substeps, turbine.gearbox_ratio,
         data.arrays(counters()), rows, raw, plain, exact,
@@ -179,9 +179,9 @@ def along(
         moved = slice(0, None, 2)
         x[moved] += moves(rng, x[moved].shape, scale, perturbation, turbine)
         states.append(x)
-        pieces.append(wind_pieces(wind, run.time[pick], step, count))
+        pieces.append(wind_pieces(turbine, wind, run.time[pick], step, count))
         if history:
-            found = step * slopes(turbine, run.state, run.wind)
+            found = step * slopes(turbine, run.state, blown(turbine, wind, run.time))
             looked = np.concatenate([found[pick - i] for i in range(1, history + 1)], axis=1)
             looked[moved] += (
                 rng.standard_normal(looked[moved].shape) * np.tile(found.std(axis=0), history) * perturbation

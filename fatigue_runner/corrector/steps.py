@@ -6,7 +6,7 @@ rotor's map does not depend on the azimuth.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,13 +15,16 @@ import numpy as np
 from fatigue_runner.corrector.coordinates import (
     Array,
     Turn,
+    blown,
     from_fixed,
     nonlinear_part,
+    of_harmonics,
     parts_to_fixed,
     relative,
     relative_to_fixed,
     turn_of,
 )
+from fatigue_runner.integrators.linear_part import linearisation_point
 from fatigue_runner.layout import WIND
 
 if TYPE_CHECKING:
@@ -30,17 +33,26 @@ if TYPE_CHECKING:
 
 WARM = 3  # steps from true states before the sampled one: its earlier values then lie at predicted states, as in a run
 
+BEGINNING, BEGUN = (
+    8,
+    5.0,
+)  # one sample in so many lies in a run's first seconds [s], where the shaft still rings
+
+
+_ARRAYS = ("ahead_rows", "rows", "ahead", "plain", "exact", "speeds")
+
 
 @dataclass
 class Steps:
-    """n sampled steps: what predictor and corrector saw (n, rows), the plain results (n, states) of both, the exact one, and the rotor's
-    turn."""
+    """n sampled steps: what predictor and corrector saw (n, rows), the plain results (n, states) of both, the exact one, the mean winds
+    (n,) [m/s], and the rotor's turn."""
 
     ahead_rows: Array
     rows: Array
     ahead: Array
     plain: Array
     exact: Array
+    speeds: Array
     turn: Turn
 
     @property
@@ -68,15 +80,51 @@ def collect(
     per_wind: int,
     seed: int,
     damping: float,
-    learned_ahead: Array | None,
+    learned_ahead: Callable[[float], Array] | None,
+    bins: tuple[float, ...] = (),
 ) -> Steps:
-    """Steps from random places of true trajectories `runs`, sampled every `step` [s]; learned_ahead (states, rows): part of the predictor;
-    damping [1/s]: see `multi_blade.linear`."""
-    layout = turbine.layout
+    """Steps from random places of true trajectories `runs`, sampled every `step` [s]; learned_ahead: (states, rows) part of the predictor
+    for a mean wind [m/s], which may differ between the nearest of `bins`; damping [1/s]: see `multi_blade.linear`."""
     rng = np.random.Generator(np.random.PCG64(seed))
-    ahead_base, plain_base = method.matrices(turbine, step, 0.0, past, damping)
-    ahead_all = ahead_base if learned_ahead is None else ahead_base + learned_ahead
     picks = [rng.integers(past + WARM, len(run.time) - 1, per_wind) for run in runs]
+    for pick, run in zip(picks, runs, strict=True):
+        early = pick[::BEGINNING]
+        early[:] = rng.integers(
+            past + WARM, min(past + WARM + round(BEGUN / step), len(run.time) - 1), len(early)
+        )
+    kinds: dict[tuple[float, float], list[int]] = {}  # winds that share their matrices
+    for i, w in enumerate(winds):
+        nearest = min(bins, key=lambda b: abs(b - w.mean_speed), default=0.0)
+        kinds.setdefault((linearisation_point(turbine, w.mean_speed), nearest), []).append(i)
+    size = max(turbine.layout.wind_size(w.channels) for w in winds)
+    parts = []
+    for (point, nearest), here in kinds.items():
+        found: Any = [[values[i] for i in here] for values in (winds, runs, picks)]
+        learned = None if learned_ahead is None else learned_ahead(nearest)
+        parts.append(_at(turbine, method, step, past, point, found, size, damping, learned))
+    return parts[0] if len(parts) == 1 else joined(parts)
+
+
+def joined(parts: Sequence[Steps]) -> Steps:
+    """All of them, one after the other."""
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
+    }
+    cosines, sines = zip(*(part.turn for part in parts), strict=True)
+    return Steps(**arrays, turn=(np.concatenate(cosines), np.concatenate(sines)))
+
+
+def _at(
+    turbine: Turbine, method: Any, step: float, past: int, point: float, found: list[Any], size: int, damping: float,
+    learned_ahead: Array | None,
+) -> Steps:  # fmt: skip
+    """Those of the winds of one linearisation point; found: winds, runs, and places in them; size: rows of the wind that has most."""
+    layout = turbine.layout
+    winds, runs, picks = found
+    ahead_base, plain_base = method.matrices(
+        turbine, step, 0.0, past, damping, point, size > len(layout.wind)
+    )
+    ahead_all = ahead_base if learned_ahead is None else ahead_base + learned_ahead
 
     def state(back: int) -> Array:
         return np.concatenate([run.state[pick - back] for run, pick in zip(runs, picks, strict=True)])
@@ -84,35 +132,48 @@ def collect(
     def wind(back: int, place: float) -> Array:
         return np.concatenate(
             [
-                w.at(run.time[pick - back] + place * step)
+                blown(turbine, w, run.time[pick - back] + place * step, size)
                 for w, run, pick in zip(winds, runs, picks, strict=True)
             ]
         )
 
     # nonlinear parts, the newest first; the oldest ones at true states, then at predicted ones
-    parts = [nonlinear_part(turbine, state(i), wind(i, 0.0), damping) for i in range(WARM, WARM + past)]
+    parts = [
+        nonlinear_part(turbine, state(i), wind(i, 0.0), damping, point) for i in range(WARM, WARM + past)
+    ]
     for back in range(WARM, -1, -1):
         x = state(back)
         pressure = np.stack([wind(back, place) for place in (0.0, 0.5, 1.0)], axis=1)
         turn = turn_of(layout, x)
-        seen = rows(turbine, x, pressure, parts, turn)
+        seen = rows(turbine, x, pressure, parts, turn, step)
         change = from_fixed(layout, seen @ ahead_all.T, turn)
-        part = nonlinear_part(turbine, x + change, pressure[:, 2], damping)
+        part = nonlinear_part(turbine, x + change, pressure[:, 2], damping, point)
         parts = [part, *parts]
         if back:
             parts = parts[:past]
     whole = np.concatenate([seen, parts_to_fixed(layout, parts[0], turn)], axis=1)
     ahead = x + from_fixed(layout, seen @ ahead_base.T, turn)
-    return Steps(seen, whole, ahead, x + from_fixed(layout, whole @ plain_base.T, turn), state(-1), turn)
+    plain = x + from_fixed(layout, whole @ plain_base.T, turn)
+    speeds = np.repeat([w.mean_speed for w in winds], [len(pick) for pick in picks])
+    return Steps(seen, whole, ahead, plain, state(-1), speeds, turn)
 
 
-def rows(turbine: Turbine, x: Array, wind: Array, parts: list[Array], turn: Turn) -> Array:
-    """(n, rows) what a predictor sees: states (n, states), wind (n, 3, signals) at start, middle and end, earlier parts, the newest
+def rows(turbine: Turbine, x: Array, wind: Array, parts: list[Array], turn: Turn, step: float) -> Array:
+    """(n, rows) what a predictor sees: states (n, states), wind (n, 3, rows) at start, middle and end, earlier parts, the newest
     first."""
-    layout = turbine.layout
+    layout, own = turbine.layout, len(turbine.layout.wind)
+    felt = []
+    if layout.harmonics or wind.shape[2] > own:
+        felt = [
+            of_harmonics(layout, x, i * step / 2, wind[:, i, layout.first_harmonic :])
+            for i in range(wind.shape[1])
+        ]
+    wind = wind[:, :, :own]
     state = relative_to_fixed(layout, relative(layout, x, turbine.gearbox_ratio), turn)
-    blown = wind.copy()
+    pressure = wind.copy()
     # the wind that the shears add at the rotor's edge; other signals as they are
-    blown[:, :, 1 : len(WIND)] *= wind[:, :, :1]
+    pressure[:, :, 1 : len(WIND)] *= wind[:, :, :1]
     earlier = [parts_to_fixed(layout, part, turn) for part in parts]
-    return np.concatenate([np.ones((len(x), 1)), state, blown.reshape(len(x), -1), *earlier], axis=1)
+    return np.concatenate(
+        [np.ones((len(x), 1)), state, pressure.reshape(len(x), -1), *felt, *earlier], axis=1
+    )

@@ -19,6 +19,7 @@ from fatigue_runner.corrector.recipe import FAMILIES, Progress, Recipe
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import validated
 from fatigue_runner.inputs.source import Source, read_mapping
+from fatigue_runner.turbine.turbine import FIXED
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
@@ -90,11 +91,9 @@ def train(
 ) -> Corrector:
     """The guarded corrector that a recipe makes, with its figures; turbine: default the recipe's; text: the recipe's file, kept in
     the artefact. Raises InputError for a recipe that asks for what cannot be."""
-    from fatigue_runner.turbine import load_turbine
-
     begin = time.perf_counter()
     progress = progress or Progress()
-    turbine = turbine or load_turbine(recipe.turbine)
+    turbine = turbine or recipe.load_turbine()
     learned = recipe.train(turbine, progress)
     binding = Binding.to(turbine, recipe.method, recipe.step)
     corrector = Corrector(
@@ -109,12 +108,15 @@ def train(
 STANDARD_FAMILY, STANDARD_TURBINE = "affine", "nrel5mw"
 
 
-def standard_recipes() -> list[Path]:
-    """The shipped recipes that take seconds and are trained anew for every turbine, by name."""
+def standard_recipes(turbine: Turbine | None = None) -> list[Path]:
+    """The shipped recipes that take seconds and are trained anew for every turbine, by name; without those of a turbine that operates
+    where this one has no controller."""
     found = []
     for path in sorted(shipped.correctors().glob("*.yaml")):
         data = read_mapping(path, "recipe", "name, family, ...").data
-        if data.get("family") == STANDARD_FAMILY and data.get("turbine") == STANDARD_TURBINE:
+        if data.get("family") != STANDARD_FAMILY or data.get("turbine") != STANDARD_TURBINE:
+            continue
+        if turbine is None or turbine.control is not None or data.get("operation", FIXED) == FIXED:
             found.append(path)
     return found
 
@@ -149,8 +151,6 @@ def tune_file(
 
     told: gets a `tuning.TrialReport` after each trial. Raises InputError for a recipe of a family that has nothing to tune.
     """
-    from fatigue_runner.turbine import load_turbine
-
     recipe, _ = read_recipe(path, overrides)
-    settings, stopped = recipe.tune(load_turbine(recipe.turbine), trials, epochs, storage, told)
+    settings, stopped = recipe.tune(recipe.load_turbine(), trials, epochs, storage, told)
     return dict(settings), stopped

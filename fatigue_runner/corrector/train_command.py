@@ -82,7 +82,7 @@ def _train_standard_set(turbine: str, out: Path | None, seed: int | None, consol
     found = load_turbine(turbine)
     folder = out or (Path(turbine).parent if Path(turbine).suffix else Path()) / "correctors"
     failed = []
-    for recipe in standard_recipes():
+    for recipe in standard_recipes(found):
         name = f"{recipe.stem}-{found.name}"
         console.print(f"[bold]{name}[/]")
         try:

@@ -95,9 +95,7 @@ class LinearMultistep:
     def prepare(self, task: Task) -> Prepared:
         """See `contract.Method`."""
         arrays = self._arrays()
-        return Prepared(
-            lambda _start, _signals, _aligned: arrays, slope_rows(self.start) + 1, self.evaluations
-        )
+        return Prepared(lambda _lanes, _aligned: arrays, slope_rows(self.start) + 1, self.evaluations)
 
     def _arrays(self) -> AdamsArrays:
         weights = np.array([[float(x) for x in w] for w in (self.predictor, self.corrector or [0] * BACK)])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import stepper
-from fatigue_runner.integrators.contract import Method, Prepared, Task
+from fatigue_runner.integrators.contract import Lanes, Method, Prepared, Task
 from fatigue_runner.integrators.output import OutputPlan, plan_output
 from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
 from fatigue_runner.integrators.signals import PitchCells, Signals
@@ -49,10 +49,11 @@ class Block:
 
 @dataclass
 class _Group:
-    """What the loop left of one group: `out` is written anew by the next; clamped (LANES,); wall [s]."""
+    """What the loop left of one group: `out` is written anew by the next; clamped, extra evaluations (LANES,); wall [s]."""
 
     out: Output
     clamped: NDArray[np.int64]
+    extra: NDArray[np.int64]
     wall: float
 
 
@@ -119,17 +120,19 @@ def run_block(block: Block, winds: Sequence[WindSource], initial: Array) -> list
         changing = control is not None or bool(np.any(own[:, 1:])) or len(own) > 1
         p, u = np.zeros(own.shape[2]), np.zeros(len(layout.control) * LANES)
         signals = Signals(cell_duration, aligned(own), changing, control, aligned(p), aligned(u))
-        group = _run_group(block, x, signals)
-        lanes = min(LANES, len(winds) - number * LANES)
+        here = winds[number * LANES : (number + 1) * LANES]
+        lanes = len(here)
+        # the last group is filled with copies of its last case
+        speeds = tuple(wind.mean_speed for wind in here) + (here[-1].mean_speed,) * (LANES - lanes)
+        group = _run_group(block, x, signals, speeds)
         rows = group.out.rows.reshape(-1, layout.size, LANES)
         states = np.ascontiguousarray(rows.transpose(2, 0, 1)[:lanes])
         for lane in range(lanes):
-            wind = winds[number * LANES + lane]
-            out.append(_trajectory(block, wind, states[lane], group, lane, lanes))
+            out.append(_trajectory(block, here[lane], states[lane], group, lane, lanes))
     return out
 
 
-def _run_group(block: Block, x: Array, signals: Signals) -> _Group:
+def _run_group(block: Block, x: Array, signals: Signals, speeds: tuple[float, ...]) -> _Group:
     from numba import typeof
 
     plan, data, size = block.plan, block.data, block.data.model.layout.size
@@ -147,7 +150,7 @@ def _run_group(block: Block, x: Array, signals: Signals) -> _Group:
         errors=np.full((intervals, LANES), np.nan),
         diverged_at=np.where(fine, -1.0, 0.0),
     )
-    method = block.prepared.arrays(start, signals, aligned)
+    method = block.prepared.arrays(Lanes(start, signals, speeds), aligned)
     arguments = (
         method, data.model, block.step, block.steps, signals, data.arrays(clamped)._replace(tables=tables),
         room(start, block.prepared.slopes, 1 << (size - 1).bit_length(), aligned), plan.arrays, out,
@@ -166,7 +169,8 @@ def _run_group(block: Block, x: Array, signals: Signals) -> _Group:
         accepted=out.accepted[noted], discrepancy=out.discrepancy[noted], errors=out.errors[noted]
     )
     out.rows[0] = x
-    return _Group(told, clamped, wall)
+    extra = counters() if block.prepared.extra is None else block.prepared.extra(method)
+    return _Group(told, clamped, extra, wall)
 
 
 def _trajectory(
@@ -197,7 +201,7 @@ def _trajectory(
         threshold=np.full(n - 1, limit),
         local_error=error,
         steps=steps,
-        evaluations=block.prepared.evaluations(steps),
+        evaluations=block.prepared.evaluations(steps) + int(group.extra[lane]),
         clamped_lookups=int(group.clamped[lane]),
         wall_time=group.wall / lanes,
         diverged_at=diverged_at if diverged_at >= 0 else None,

@@ -97,7 +97,7 @@ class ButcherTableau:
         if task.corrector is not None:
             return corrected.prepare(self, task, task.corrector)
         arrays = runge_kutta_arrays(self)
-        return Prepared(lambda _start, _signals, _aligned: arrays, slope_rows(self), self.evaluations)
+        return Prepared(lambda _lanes, _aligned: arrays, slope_rows(self), self.evaluations)
 
 
 @lru_cache(maxsize=64)

@@ -37,18 +37,28 @@ class Task:
 
 
 @dataclass(frozen=True)
+class Lanes:
+    """What the cases of one group begin with: states (width,), signals, mean wind speeds (LANES,) [m/s]."""
+
+    start: Array
+    signals: Signals
+    speeds: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Prepared:
     """A method made ready for the runs of one block.
 
-    arrays: from the initial states (width,) of a group, its signals and a function that copies onto cache lines, to the NamedTuple
-    that the compiled step takes, with room of its own; slopes: rows of k; evaluations: of f in a run of so many steps; limit: of the
-    hybrid's discrepancy, NaN where no step is tested.
+    arrays: from a group's lanes and a function that copies onto cache lines, to the NamedTuple that the compiled step takes, with room of
+    its own; slopes: rows of k; evaluations: of f in a run of so many steps; limit: of the hybrid's discrepancy, NaN where no step is
+    tested; extra: evaluations beyond those, per lane (LANES,), from the arrays of a run that has ended.
     """
 
-    arrays: Callable[[Array, Signals, Aligned], Any]
+    arrays: Callable[[Lanes, Aligned], Any]
     slopes: int
     evaluations: Callable[[int], int]
     limit: float = np.nan
+    extra: Callable[[Any], NDArray[np.int64]] | None = None
 
 
 class Method(Protocol):

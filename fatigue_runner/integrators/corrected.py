@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators.choice import compiled_for
-from fatigue_runner.integrators.contract import Aligned, Prepared, Task
+from fatigue_runner.integrators.contract import Aligned, Lanes, Prepared, Task
 from fatigue_runner.integrators.correction import correction
 from fatigue_runner.integrators.dense import blocks_of
 from fatigue_runner.integrators.guard import GuardUnits, guard, guard_units, norm_of, refuse_outside
@@ -127,12 +127,12 @@ def prepare(method: Correctable, task: Task, corrector: StepCorrector) -> Prepar
         extra = judge.substeps * stages - 1
     limit, hybrid = float(judge.limit), task.mode == "hybrid"
     bounds = np.array(judge.low), np.array(judge.high)
-    units = guard_units(judge.atol, judge.rtol)
-    tested = Tested(hybrid, units, limit, norm_of(judge), *bounds)
-    learned = corrector.map_data(task.turbine, task.pitch)
 
-    def arrays(start: Array, signals: Signals, aligned: Aligned) -> CorrectedArrays:
-        room = _room(start, len(signals.p), task, slope_rows(method), aligned)
+    def arrays(lanes: Lanes, aligned: Aligned) -> CorrectedArrays:
+        room = _room(lanes.start, len(lanes.signals.p), task, slope_rows(method), aligned)
+        units = guard_units(judge.atol, judge.rtol)
+        tested = Tested(hybrid, units, limit, norm_of(judge), *bounds)
+        learned = corrector.map_data(task.turbine, task.pitch)
         return CorrectedArrays(
             own.stages, own.result, stage_rows(stages), learned, corrector.history, fallback, tested, room
         )

@@ -6,7 +6,8 @@ takes the distance of x~ from x into account to first order). Weights: Hochbruck
 Beylkin, Keiser & Vozovoi (1998), doi:10.1006/jcph.1998.6093, for the implicit ones.
 
 Predictor and corrector are one matrix product each on the rows of a step in multi-blade coordinates (`multi_blade`). A learned
-correction is another matrix on the same rows; guarded (hybrid), both the predictor's and the corrector's learned part are.
+correction is another matrix on the same rows. Guarded (hybrid), the corrected result must agree with that of the method as it is, and
+with the predicted one; a step that does not is made anew by a few smaller ones of RK4, which is stable where the method may not be.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ from numpy.typing import NDArray
 from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.integrators import multi_blade
 from fatigue_runner.integrators.choice import compiled_for
-from fatigue_runner.integrators.contract import Aligned, Prepared, Task
-from fatigue_runner.integrators.dense import blocks_of, dense_rows, multiply, pack
+from fatigue_runner.integrators.contract import Aligned, Lanes, Prepared, Task
+from fatigue_runner.integrators.dense import blocks_of, dense_rows, multiply, of_lanes, pack
 from fatigue_runner.integrators.guard import GuardUnits, guard, guard_units, norm_of
+from fatigue_runner.integrators.linear_part import LINEARISED_AT, linearisation_point
 from fatigue_runner.integrators.multi_blade_rows import (
     advanced,
     forget_infinite,
+    harmonic_rows,
     nonlinear_part,
     part_rows,
     part_size,
@@ -36,7 +39,7 @@ from fatigue_runner.integrators.multi_blade_rows import (
     state_rows,
     wind_rows,
 )
-from fatigue_runner.integrators.protocol import MultiBladeData
+from fatigue_runner.integrators.protocol import MultiBladeData, StepCorrector
 from fatigue_runner.integrators.runge_kutta import Stages, Sum, runge_kutta_arrays, slope_rows
 from fatigue_runner.integrators.signals import Signals, signals_at
 from fatigue_runner.integrators.single_steps import integrate
@@ -50,14 +53,16 @@ from fatigue_runner.integrators.stepping import (
     subtract,
 )
 from fatigue_runner.integrators.tableaux import RK4
+from fatigue_runner.layout import BLADES
 from fatigue_runner.turbine.lane_code import LANES
-from fatigue_runner.turbine.model import constant, rhs, rows, wind_signals
+from fatigue_runner.turbine.model import constant, harmonics, rhs, rows, width, wind_signals
 
 Array = NDArray[np.float64]
 
 STARTING = 8  # sub-steps of RK4 in each step before there are enough earlier values
 
 first_wind_row = constant(multi_blade.wind_row)
+first_harmonic_row = constant(multi_blade.harmonic_row)
 first_past_row = constant(multi_blade.past_row)
 
 
@@ -85,33 +90,48 @@ class ExponentialAdams:
         return None
 
     def matrices(
-        self, turbine: Any, step: float, pitch: float, past: int, damping: float = 0.0
+        self,
+        turbine: Any,
+        step: float,
+        pitch: float,
+        past: int,
+        damping: float = 0.0,
+        point: float = LINEARISED_AT,
+        harmonics: bool = False,
     ) -> tuple[Array, Array]:
         """Predictor and corrector on the rows of a step that holds `past` earlier values; see `multi_blade.matrices`."""
-        return multi_blade.matrices(turbine, step, pitch, (self.predictor, self.past), past, damping)
+        nodes = self.predictor, self.past
+        return multi_blade.matrices(turbine, step, pitch, nodes, past, damping, point, harmonics)
 
     def prepare(self, task: Task) -> Prepared:
         """See `contract.Method`."""
-        corrector, size = task.corrector, task.layout.size
+        corrector, turbine = task.corrector, task.turbine
         past = self.past if corrector is None else corrector.past
         damping = 0.0 if corrector is None else corrector.damping
-        low = pack(multi_blade.linear(task.turbine, task.pitch, damping).low)[0]
-        ratio, start = task.turbine.gearbox_ratio, runge_kutta_arrays(RK4)
-        if corrector is None:
-            ahead, plain = self.matrices(task.turbine, task.step, task.pitch, past)
-            maps = _plain_maps(ahead, plain)
-            units = guard_units((1.0,) * size, (0.0,) * size)
-            tested, limit = Tested(False, units, units, 0.0, 0), np.nan
-        else:
-            corrector.bind(task.turbine, self.name, task.step)
-            maps = corrector.map_data(task.turbine, task.pitch)
-            judge = corrector.guard
-            limit = float(judge.limit)
-            own, before = guard_units(judge.atol, judge.rtol), guard_units(judge.ahead_atol, judge.rtol)
-            tested = Tested(task.mode == "hybrid", before, own, limit, norm_of(judge))
+        ratio, start = turbine.gearbox_ratio, runge_kutta_arrays(RK4)
+        if corrector is not None:
+            corrector.bind(turbine, self.name, task.step)
+        hybrid = corrector is not None and task.mode == "hybrid"
 
-        def arrays(states: Array, signals: Signals, aligned: Aligned) -> ExponentialAdamsArrays:
-            room = _room(states, len(signals.p), task.layout, past, len(maps.factors), aligned)
+        harmonics = task.layout.harmonics
+
+        def maps_at(point: float) -> MultiBladeData:
+            if corrector is not None:
+                return corrector.map_data(turbine, task.pitch, point, harmonics)
+            return _plain_maps(
+                *self.matrices(turbine, task.step, task.pitch, past, point=point, harmonics=harmonics)
+            )
+
+        def arrays(lanes: Lanes, aligned: Aligned) -> ExponentialAdamsArrays:
+            points = [linearisation_point(turbine, speed) for speed in lanes.speeds]
+            [low] = of_lanes(
+                lambda p: [pack(multi_blade.linear(turbine, task.pitch, damping, p).low)[0]], points
+            )
+            factors = maps_at(points[0]).factors
+            ahead, weights, plain = of_lanes(lambda point: maps_at(point)[:-1], points)
+            maps = MultiBladeData(ahead, weights, plain, factors)
+            room = _room(lanes.start, len(lanes.signals.p), task.layout, past, len(factors), aligned)
+            tested = _tested(corrector, hybrid, task.layout.size)
             return ExponentialAdamsArrays(
                 low, ratio, past, start.stages, start.result, STARTING, maps, tested, room
             )
@@ -121,7 +141,9 @@ class ExponentialAdams:
             begun = min(max(steps, self.past - 1), past - 1) - (self.past - 1)
             return self.evaluations(steps) + begun * 4 * STARTING
 
-        return Prepared(arrays, RING, evaluations, limit if tested.hybrid else np.nan)
+        if corrector is None or not hybrid:
+            return Prepared(arrays, RING, evaluations)
+        return Prepared(arrays, RING, evaluations, float(corrector.guard.limit), _evaluations_of_refused)
 
 
 _SOURCE = (
@@ -135,17 +157,29 @@ ETDABM4 = ExponentialAdams("etdabm4", 4, _SOURCE, 3, 3)
 
 
 class Tested(NamedTuple):
-    """The hybrid's acceptance test: units of the predictor's and of the corrector's result, limit and norm of both."""
+    """The hybrid's acceptance test: units of the corrected result's distance from the predicted one and from that of the method as it is,
+    limit and norm of both; substeps: of RK4 in a step that is refused."""
 
     hybrid: bool
     ahead_units: GuardUnits
     units: GuardUnits
     limit: float
     norm: int
+    substeps: int
+
+
+def _tested(corrector: StepCorrector | None, hybrid: bool, states: int) -> Tested:
+    if corrector is None:
+        units = guard_units((1.0,) * states, (0.0,) * states)
+        return Tested(False, units, units, 0.0, 0, 1)
+    judge = corrector.guard
+    ahead, units = (guard_units(atol, judge.rtol) for atol in (judge.ahead_atol, judge.atol))
+    return Tested(hybrid, ahead, units, float(judge.limit), norm_of(judge), judge.substeps)
 
 
 class Room(NamedTuple):
-    """ahead, fixed, other, change: states; middle, start: winds; seen: rows of the step; ring: nonlinear parts; the start's own arrays."""
+    """ahead, fixed, other, change: states; middle, start: winds; seen: rows of the step; ring: nonlinear parts; judged: since the last
+    note, fine: in this step, refused: steps in all, per lane; then the arrays of the start and of refused steps."""
 
     ahead: Array
     fixed: Array
@@ -156,9 +190,12 @@ class Room(NamedTuple):
     seen: Array
     ring: Array
     turned: Array
+    turn: Array
     rel: Array
     product: Array
     judged: tuple[Array, NDArray[np.bool_]]
+    fine: NDArray[np.bool_]
+    refused: NDArray[np.int64]
     scaled: Array
     states: Array
     k: Array
@@ -178,10 +215,15 @@ class ExponentialAdamsArrays(NamedTuple):
     room: Room
 
 
+def _evaluations_of_refused(method: ExponentialAdamsArrays) -> NDArray[np.int64]:
+    """Of the steps made anew: those of RK4, and one at the new place."""
+    return method.room.refused * (RK4.evaluations_per_step * method.tested.substeps + 1)
+
+
 def _plain_maps(ahead: Array, plain: Array) -> MultiBladeData:
     """Of the method alone."""
-    first, second = pack(ahead)[0], pack(plain)[0]
-    return MultiBladeData(first, first, second, second, np.zeros(0, np.int64))
+    corrector = pack(plain)[0]
+    return MultiBladeData(pack(ahead)[0], corrector, corrector, np.zeros(0, np.int64))
 
 
 def _room(start: Array, blown: int, layout: Any, past: int, factors: int, aligned: Aligned) -> Room:
@@ -192,7 +234,7 @@ def _room(start: Array, blown: int, layout: Any, past: int, factors: int, aligne
     zeros = {
         "ahead": padded, "fixed": padded, "other": padded, "change": padded,
         "start": blown, "middle": blown,
-        "seen": inputs * LANES, "turned": 2 * LANES, "rel": layout.relative_size * LANES,
+        "seen": inputs * LANES, "turned": 2 * LANES, "turn": 6 * LANES, "rel": layout.relative_size * LANES,
         "product": 8 * blocks_of(part) * LANES, "scaled": halves * LANES, "stage": width,
         "wind": blown,
     }  # fmt: skip
@@ -200,6 +242,8 @@ def _room(start: Array, blown: int, layout: Any, past: int, factors: int, aligne
         **{name: aligned(np.zeros(size)) for name, size in zeros.items()},
         ring=aligned(np.zeros((past + 1, part * LANES))),
         judged=(aligned(np.zeros(LANES)), np.ones(LANES, np.bool_)),
+        fine=np.ones(LANES, np.bool_),
+        refused=np.zeros(LANES, np.int64),
         states=aligned(np.zeros((3, width))),
         k=aligned(np.zeros((slope_rows(RK4), width))),
     )
@@ -209,8 +253,15 @@ def _room(start: Array, blown: int, layout: Any, past: int, factors: int, aligne
 
 
 @njit(**LEAN)
+def _copy_line(model, table, line, out):
+    for m in range(width(model)):
+        out[m] = table[line, m]
+
+
+@njit(**LEAN)
 def _copy_wind(model, p, out):
-    for m in range(wind_signals(model) * LANES):
+    # all that blows, harmonics, too
+    for m in range(len(out)):
         out[m] = p[m]
 
 
@@ -241,9 +292,9 @@ def _recover(method):
 
 
 @njit(**INLINE)
-def _predict(model, method, n, newest, signals, ring):
-    """room.ahead = the predictor's result, guarded in hybrid mode; room.seen = the rows that it sees."""
-    room, maps, tested, past = method.room, method.maps, method.tested, method.past
+def _predict(model, method, h, newest, signals, ring):
+    """room.ahead = the predictor's result; room.seen = the rows that it sees."""
+    room, maps, past = method.room, method.maps, method.past
     seen, turned, current = room.seen, room.turned, ring.current
     first, wind, signal_count = first_past_row(model), first_wind_row(model), wind_signals(model)
     sine_cosine(model, current, turned)
@@ -251,25 +302,22 @@ def _predict(model, method, n, newest, signals, ring):
     wind_rows(model, room.start, seen, wind)
     wind_rows(model, room.middle, seen, wind + signal_count)
     wind_rows(model, signals.p, seen, wind + 2 * signal_count)
+    if harmonics(model):
+        felt = first_harmonic_row(model)
+        harmonic_rows(model, current, 0.0, room.start, turned, room.turn, seen, felt)
+        harmonic_rows(model, current, 0.5 * h, room.middle, turned, room.turn, seen, felt + BLADES)
+        harmonic_rows(model, current, h, signals.p, turned, room.turn, seen, felt + 2 * BLADES)
     for i in range(past):
         part_rows(model, room.ring, (newest - i) % (past + 1), turned, seen, first + part_size(model) * i)
     inputs = first + part_size(model) * past
     dense_rows(seen, maps.ahead, inputs, rows(model), room.change)
-    if tested.hybrid:
-        # a wrong place of the evaluation would spoil the fallback, too
-        advanced(model, current, room.change, turned, room.fixed)
-        dense_rows(seen, maps.plain_ahead, inputs, rows(model), room.change)
-        advanced(model, current, room.change, turned, room.other)
-        guard(
-            model, room.ahead, room.other, room.fixed, tested.ahead_units, tested.limit, tested.norm, room.scaled, room.judged
-        )  # fmt: skip
-    else:
-        advanced(model, current, room.change, turned, room.ahead)
+    advanced(model, current, room.change, turned, room.ahead)
 
 
 @njit(**INLINE)
 def _correct(model, method, line, ring):
-    """ring.current = the corrector's result, guarded in hybrid mode."""
+    """ring.current = the corrector's result; in hybrid mode judged by that of the method as it is, and by the predictor's: what one step
+    cannot follow, a corner of the equations or a wrong map, sets these two apart."""
     room, maps, tested = method.room, method.maps, method.tested
     seen, turned, current = room.seen, room.turned, ring.current
     new_row = first_past_row(model) + part_size(model) * method.past
@@ -280,14 +328,45 @@ def _correct(model, method, line, ring):
     dense_rows(seen, maps.weights, count * (1 + len(maps.factors)), rows(model), room.change)
     advanced(model, current, room.change, turned, room.fixed)
     if tested.hybrid:
-        dense_rows(seen, maps.plain_weights, count, rows(model), room.change)
+        dense_rows(seen, maps.plain, count, rows(model), room.change)
         advanced(model, current, room.change, turned, room.other)
         guard(
-            model, current, room.other, room.fixed, tested.units, tested.limit, tested.norm, room.scaled, room.judged
+            model, current, room.other, room.fixed, tested.units, tested.limit, tested.norm, room.scaled,
+            (room.judged[0], room.fine),
+        )  # fmt: skip
+        guard(
+            model, room.other, room.ahead, room.fixed, tested.ahead_units, tested.limit, tested.norm, room.scaled,
+            (room.judged[0], room.fine),
         )  # fmt: skip
     else:
         move(model, room.fixed, current)
     keep_largest_distance(model, current, room.ahead, ring.largest)
+
+
+@njit(nogil=True, error_model="numpy", _nrt=False)
+def _set(fine, value):
+    for j in range(LANES):
+        fine[j] = value
+
+
+@njit(nogil=True, error_model="numpy", _nrt=False)
+def _all_accepted(room):
+    """Whether no lane was refused in this step; those that were are counted and noted."""
+    accepted, whole = room.judged[1], True
+    for j in range(LANES):
+        if not room.fine[j]:
+            accepted[j] = whole = False
+            room.refused[j] += 1
+    return whole
+
+
+@njit(nogil=True, error_model="numpy", _nrt=False)
+def _replace(model, fine, source, target):
+    """target = source in the lanes that are not fine."""
+    for i in range(rows(model)):
+        for j in range(LANES):
+            if not fine[j]:
+                target[i * LANES + j] = source[i * LANES + j]
 
 
 @compiled_for(advance, ExponentialAdamsArrays)
@@ -299,23 +378,31 @@ def _advance(method, model, n, h, now, new, signals, data, ring):
         signals_at(model, (n + 0.5) * h, signals)
         _copy_wind(model, signals.p, room.middle)
         signals_at(model, (n + 1) * h, signals)
-    if n < past - 1:
-        small = method.substeps
-        inner = Signals(
-            signals.cell_duration, signals.cells, signals.changing, signals.control, room.wind, signals.u
-        )
-        integrate(
-            model, ring.current, method.stages, method.result, h / small, n * small, small, inner, data,
-            room.states, room.k, room.stage, room.other,
-        )  # fmt: skip
-        move(model, ring.current, room.ahead)
-    else:
-        _predict(model, method, n, newest, signals, ring)
-    rhs(model, room.ahead, signals.p, signals.u, ring.slope, 0, data)
-    _times_linear(model, method, room.ahead)
-    nonlinear_part(model, ring.slope, room.product, 1.0 / method.ratio, room.ring, line)
-    if n >= past - 1:
+    small = method.substeps if n < past - 1 else 0  # steps of RK4 in this one; 0: predictor and corrector
+    _set(room.fine, small == 0)
+    if small == 0:
+        _predict(model, method, h, newest, signals, ring)
+    while True:
+        if small > 0:
+            inner = Signals(
+                signals.cell_duration, signals.cells, signals.changing, signals.control, room.wind, signals.u
+            )
+            _copy_line(model, ring.states, now, room.fixed)
+            integrate(
+                model, room.fixed, method.stages, method.result, h / small, n * small, small, inner, data,
+                room.states, room.k, room.stage, room.other,
+            )  # fmt: skip
+            _replace(model, room.fine, room.fixed, ring.current)
+            _replace(model, room.fine, room.fixed, room.ahead)
+        rhs(model, room.ahead, signals.p, signals.u, ring.slope, 0, data)
+        _times_linear(model, method, room.ahead)
+        nonlinear_part(model, ring.slope, room.product, 1.0 / method.ratio, room.ring, line)
+        if small > 0:
+            break
         _correct(model, method, line, ring)
+        if not method.tested.hybrid or _all_accepted(room):
+            break
+        small = method.tested.substeps
     keep(model, ring.current, ring.states, new)
     return all_fine(model, ring.current)
 

@@ -17,12 +17,18 @@ from numpy.typing import NDArray
 
 from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.integrators.choice import compiled_for
-from fatigue_runner.integrators.contract import Aligned, Prepared, Task
-from fatigue_runner.integrators.dense import blocks_of, dense_rows, pack
-from fatigue_runner.integrators.linear_part import linear_part, phi_functions
-from fatigue_runner.integrators.signals import Signals, signals_at
+from fatigue_runner.integrators.contract import Aligned, Lanes, Prepared, Task
+from fatigue_runner.integrators.dense import blocks_of, dense_rows, of_lanes, pack
+from fatigue_runner.integrators.linear_part import (
+    LINEARISED_AT,
+    linear_part,
+    linearisation_point,
+    phi_functions,
+)
+from fatigue_runner.integrators.signals import signals_at
 from fatigue_runner.integrators.stepper import RING, advance, begin, finish, note, recover
 from fatigue_runner.integrators.stepping import add, all_fine, keep
+from fatigue_runner.turbine.lane_code import LANES
 from fatigue_runner.turbine.model import rhs, rows, width
 
 if TYPE_CHECKING:
@@ -54,11 +60,12 @@ class ExponentialRungeKutta:
 
     def prepare(self, task: Task) -> Prepared:
         """See `contract.Method`."""
-        parts, padded = matrices(task.turbine, task.step, task.pitch), blocks_of(task.layout.size) * 8
+        padded = blocks_of(task.layout.size) * 8 * LANES
 
-        def arrays(start: Array, signals: Signals, aligned: Aligned) -> ExponentialArrays:
-            lanes = len(start) // task.layout.size
-            return ExponentialArrays(*parts, *(aligned(np.zeros(padded * lanes)) for _ in range(9)))
+        def arrays(lanes: Lanes, aligned: Aligned) -> ExponentialArrays:
+            points = [linearisation_point(task.turbine, speed) for speed in lanes.speeds]
+            parts = of_lanes(lambda point: matrices(task.turbine, task.step, task.pitch, point), points)
+            return ExponentialArrays(*parts, *(aligned(np.zeros(padded)) for _ in range(9)))
 
         return Prepared(arrays, RING, self.evaluations)
 
@@ -71,9 +78,9 @@ ETDRK4 = ExponentialRungeKutta(
 
 
 @lru_cache(maxsize=256)
-def matrices(turbine: Turbine, step: float, pitch: float) -> tuple[Array, ...]:
-    """A, then h/2 phi_1(hA/2), h phi_1(hA), h phi_2(hA/2), h phi_2(hA), h phi_3(hA), as `dense` reads them."""
-    a = linear_part(turbine, pitch)
+def matrices(turbine: Turbine, step: float, pitch: float, point: float = LINEARISED_AT) -> tuple[Array, ...]:
+    """A at a linearisation point, then h/2 phi_1(hA/2), h phi_1(hA), h phi_2(hA/2), h phi_2(hA), h phi_3(hA), as `dense` reads them."""
+    a = linear_part(turbine, pitch, point)
     half, full = phi_functions(a * step / 2, 2), phi_functions(a * step, 3)
     parts = (a, step / 2 * half[1], step * full[1], step * half[2], step * full[2], step * full[3])
     return tuple(pack(part)[0] for part in parts)

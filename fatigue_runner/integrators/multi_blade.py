@@ -1,7 +1,8 @@
 """Multi-blade (Coleman) coordinates: the hub's frame that does not turn, where an isotropic rotor has constant coefficients.
 
 The exponential Adams methods write a step there: one matrix product then makes a predictor or a corrector. What a step sees are rows
-[n][LANES]: 1; the relative state; wind at the step's start, middle and end; then nonlinear parts, the newest first, the new one last.
+[n][LANES]: 1; the relative state; wind at the step's start, middle and end; where the equations take azimuthal harmonics, what the
+blades feel of them (mean, cosine and sine part) at these times; then nonlinear parts, the newest first, the new one last.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fatigue_runner.integrators.linear_part import linear_part, phi_functions
+from fatigue_runner.integrators.linear_part import LINEARISED_AT, linear_part, phi_functions
 from fatigue_runner.layout import BLADES, Layout
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 
 STATE_ROW = 1
 MOST_PAST = 4
+TIMES = 3  # of a step at which the wind is seen
 
 
 def wind_row(layout: Layout) -> int:
@@ -31,9 +33,14 @@ def wind_row(layout: Layout) -> int:
     return STATE_ROW + layout.relative_size
 
 
+def harmonic_row(layout: Layout) -> int:
+    """First row of what the blades feel of azimuthal harmonics."""
+    return wind_row(layout) + TIMES * len(layout.wind)
+
+
 def past_row(layout: Layout) -> int:
     """First row of the nonlinear parts."""
-    return wind_row(layout) + 3 * len(layout.wind)
+    return harmonic_row(layout) + (TIMES * BLADES if layout.harmonics else 0)
 
 
 def parts(layout: Layout) -> int:
@@ -44,6 +51,11 @@ def parts(layout: Layout) -> int:
 def base_rows(layout: Layout, past: int) -> int:
     """Rows that a corrector sees with `past` earlier nonlinear parts."""
     return past_row(layout) + parts(layout) * (past + 1)
+
+
+def seen_by(turbine: Turbine, harmonics: bool) -> Layout:
+    """The turbine's layout as it is under wind with azimuthal harmonics, or without."""
+    return turbine.layout.extended(harmonics=turbine.layout.harmonics or harmonics)
 
 
 def to_multi_blade(rows: int, first: tuple[int, ...]) -> Array:
@@ -85,8 +97,9 @@ class Linear:
 
 
 @lru_cache(maxsize=64)
-def linear(turbine: Turbine, pitch: float, damping: float = 0.0) -> Linear:
-    """The linear part as it looks from every azimuth alike, to rounding: what the average leaves of a coupling is dropped.
+def linear(turbine: Turbine, pitch: float, damping: float = 0.0, point: float = LINEARISED_AT) -> Linear:
+    """The linear part at a linearisation point as it looks from every azimuth alike, to rounding: what the average leaves of a coupling
+    is dropped.
 
     damping [1/s]: added to the generator's. The torque law's line of region 2.5 is 5/s steeper than region 2, and with A of region 2
     steps above 0.1 s are unstable there; between the two both are stable (measured), and a learned part makes up for the accuracy.
@@ -94,7 +107,7 @@ def linear(turbine: Turbine, pitch: float, damping: float = 0.0) -> Linear:
     layout = turbine.layout
     ratio, n = turbine.gearbox_ratio, layout.freedoms
     rotor, generator = layout.rotor, layout.generator
-    own = linear_part(turbine, pitch).copy()
+    own = linear_part(turbine, pitch, point).copy()
     own[layout.generator_speed, layout.generator_speed] -= damping
     to_fixed = transforms(layout).state
     a = _isotropic(to_fixed @ own @ np.linalg.inv(to_fixed), layout)
@@ -151,13 +164,15 @@ def weights(a: Array, step: float, nodes: list[int]) -> list[Array]:
 
 @lru_cache(maxsize=256)
 def matrices(
-    turbine: Turbine, step: float, pitch: float, nodes: tuple[int, int], past: int, damping: float = 0.0
-) -> tuple[Array, Array]:
+    turbine: Turbine, step: float, pitch: float, nodes: tuple[int, int], past: int, damping: float = 0.0, point: float = LINEARISED_AT,
+    harmonics: bool = False,
+) -> tuple[Array, Array]:  # fmt: skip
     """Predictor (size, rows before the new part) and corrector (size, `base_rows`) on the rows of a step, in multi-blade coordinates.
 
-    nodes: earlier values in the polynomials of predictor and corrector; `past` of them stand in the rows.
+    nodes: earlier values in the polynomials of predictor and corrector; `past` of them stand in the rows; point: of the linearisation;
+    harmonics: whether the equations take azimuthal ones.
     """
-    layout, line = turbine.layout, linear(turbine, pitch, damping)
+    layout, line = seen_by(turbine, harmonics), linear(turbine, pitch, damping, point)
     turn, width = transforms(layout), parts(layout)
     spread = _parts_to_state(layout, turbine.gearbox_ratio)
     back = np.linalg.inv(turn.relative), np.linalg.inv(turn.parts)

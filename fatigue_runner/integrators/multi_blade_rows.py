@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numba.extending import overload
 
-from fatigue_runner.compiled import LEAN, njit
+from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.integrators.multi_blade import STATE_ROW
-from fatigue_runner.layout import WIND
+from fatigue_runner.layout import BLADES, TRIPLE, WIND
 from fatigue_runner.turbine.lane_code import LANES
 from fatigue_runner.turbine.model import constant, first_order, freedoms, rotor, wind_signals
 
@@ -22,6 +22,7 @@ SIN60 = math.sqrt(0.75)
 EVERY_WIND = len(WIND)  # speed and two shears; signals of a layout's own follow
 
 relative_rows = constant(lambda layout: layout.relative_size)
+first_harmonic = constant(lambda layout: layout.first_harmonic)
 part_size = constant(lambda layout: layout.freedoms + len(layout.first_order))
 
 
@@ -110,6 +111,60 @@ def wind_rows(model, p, rows, to):
         rows[(to + 2) * LANES + j] = v * p[2 * LANES + j]
     for m in range(EVERY_WIND * LANES, wind_signals(model) * LANES):
         rows[to * LANES + m] = p[m]
+
+
+@njit(**LEAN)
+def _thrice(model, x, ahead, turned, turn):
+    """turn = sine and cosine of three times the azimuth `ahead` [s] of the state x, whose own are `turned`; then 0 and 1, twice."""
+    for j in range(LANES):
+        d = x[(freedoms(model) + rotor(model)) * LANES + j] * ahead
+        y = d * d
+        # Taylor series: a rotor turns by a small angle in a step
+        sine = d * (1.0 + y * (-1 / 6 + y * (1 / 120 - y / 5040)))
+        cosine = 1.0 + y * (-0.5 + y * (1 / 24 - y / 720))
+        s = turned[j] * cosine + turned[LANES + j] * sine
+        c = turned[LANES + j] * cosine - turned[j] * sine
+        turn[j] = s * (3.0 - 4.0 * s * s)
+        turn[LANES + j] = c * (4.0 * c * c - 3.0)
+        turn[2 * LANES + j] = 0.0
+        turn[3 * LANES + j] = 1.0
+
+
+@njit(**LEAN)
+def _clear(rows, to):
+    place = np.uint64(to * LANES)
+    for m in range(BLADES * LANES):
+        rows[place + np.uint64(m)] = 0.0
+
+
+@njit(**LEAN)
+def _add_triple(p, first, turn, rows, to):
+    """Add harmonics 3k + 1, 3k + 2, 3k + 3, whose amplitudes are the rows `first` on of p; turn: sine and cosine of 3 azimuths, of 3k."""
+    place, c1 = np.uint64(to * LANES), np.uint64(first * LANES)
+    lanes = np.uint64(LANES)
+    for i in range(LANES):
+        j = np.uint64(i)
+        s3, c3 = turn[j], turn[lanes + j]
+        s, c = turn[2 * lanes + j], turn[3 * lanes + j]
+        s_next, c_next = s * c3 + c * s3, c * c3 - s * s3
+        a, b = p[c1 + j], p[c1 + lanes + j]
+        e, f = p[c1 + 2 * lanes + j], p[c1 + 3 * lanes + j]
+        g, h = p[c1 + 4 * lanes + j], p[c1 + 5 * lanes + j]
+        rows[place + j] += g * c_next + h * s_next
+        rows[place + lanes + j] += (a * c + b * s) + (e * c_next + f * s_next)
+        rows[place + 2 * lanes + j] += (b * c - a * s) + (e * s_next - f * c_next)
+        turn[2 * lanes + j], turn[3 * lanes + j] = s_next, c_next
+
+
+@njit(**INLINE)
+def harmonic_rows(model, x, ahead, p, turned, turn, rows, to):
+    """Rows `to` on = mean, cosine and sine part over the blades of the azimuthal harmonics in p [m/s], felt where the blades stand `ahead`
+    [s] of the state x at its speed; turned: sine and cosine of the azimuth in x; turn: room."""
+    first = first_harmonic(model)
+    _thrice(model, x, ahead, turned, turn)
+    _clear(rows, to)
+    for triple in range((len(p) // LANES - first) // (2 * TRIPLE)):
+        _add_triple(p, first + 2 * TRIPLE * triple, turn, rows, to)
 
 
 @njit(**LEAN)

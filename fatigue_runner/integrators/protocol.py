@@ -46,23 +46,23 @@ class RawNetworkData(NamedTuple):
 class MultiBladeData(NamedTuple):
     """Predictor and corrector of an exponential Adams method on the rows of `multi_blade`, in multi-blade coordinates.
 
-    ahead, weights: with their learned parts; plain_ahead, plain_weights: without, the fallback; packed by `dense.pack`.
+    ahead, weights: with their learned parts; plain: the corrector without, by which the hybrid judges; packed by `dense.pack`.
     factors: rows that multiply all rows of the corrector.
     """
 
     ahead: Array
-    plain_ahead: Array
     weights: Array
-    plain_weights: Array
+    plain: Array
     factors: Numbers
 
 
 class Guard(Protocol):
     """The hybrid's acceptance test: |corrected - fallback| in units of atol + max(|x|, |fallback|) rtol is at most `limit`.
 
-    norm: `max` or `rms`; atol, rtol (states,). substeps: the fallback is that many smaller steps of the method itself; 0: the method of
-    the next order that shares the stages. low, high: bounds of the features behind the leading 1, or empty. ahead_atol: atol of what
-    an exponential Adams method predicts, in the units of the same limit; empty for methods that predict nothing.
+    norm: `max` or `rms`; atol, rtol (states,). substeps: the fallback is that many smaller steps of the method itself, or of RK4 where
+    that is an exponential Adams method; 0: the method of the next order that shares the stages. low, high: bounds of the features
+    behind the leading 1, or empty. ahead_atol: atol of the distance from what an exponential Adams method has predicted, in the
+    units of the same limit; empty for methods that predict nothing.
     """
 
     @property
@@ -122,11 +122,16 @@ class StepCorrector(Protocol):
 
     @property
     def guard(self) -> Guard: ...
-
     def bind(self, turbine: Turbine, method: str, step: float) -> None:
         """Raises InputError unless it was made for this turbine, method and step [s]."""
         ...
 
-    def map_data(self, turbine: Turbine, pitch: float = 0.0) -> Any:
-        """What the compiled loop reads: `StageMapData`, `RawNetworkData`, `MultiBladeData` or another type with code of its own."""
+    def map_data(
+        self, turbine: Turbine, pitch: float = 0.0, speed: float = 0.0, harmonics: bool = False
+    ) -> Any:
+        """What the compiled loop reads: `StageMapData`, `RawNetworkData`, `MultiBladeData` or another type with code of its own.
+
+        speed [m/s]: mean wind of the cases that it is for, where the method or the map differs between winds; harmonics: whether the
+        equations take azimuthal ones.
+        """
         ...

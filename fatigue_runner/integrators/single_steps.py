@@ -9,8 +9,7 @@ from fatigue_runner.integrators.correction import features, raw_features
 from fatigue_runner.integrators.runge_kutta import stages_of_step
 from fatigue_runner.integrators.signals import Signals, signals_at
 from fatigue_runner.integrators.stepping import combine, keep
-from fatigue_runner.turbine.lane_code import LANES
-from fatigue_runner.turbine.model import rhs, width, wind_signals
+from fatigue_runner.turbine.model import rhs, width
 
 
 @njit(**INLINE)
@@ -35,7 +34,7 @@ def step_samples(
     Written: rows (groups, n * LANES) what a stage-aware corrector sees, raw (groups, k * LANES) what the paper's sees,
     plain (groups, width) the method's result, exact (groups, width) that of `substeps` steps of the method `accurate`.
     """
-    size, blown = width(model), wind_signals(model) * LANES
+    size, blown = width(model), pieces.shape[3]
     k, states = np.zeros((20, size)), np.zeros((3, size))
     stage, slope, now = np.zeros(size), np.zeros(size), np.zeros(size)
     start, middle, end = np.zeros(blown), np.zeros(blown), np.zeros(blown)

@@ -287,7 +287,7 @@ def test_stability_counts_what_diverges_over_seeds_that_are_kept_for_benchmarks(
     found = stability.measure(2, 4.0, chosen=chosen)
     row = found["rows"][0]
     assert row["enhanced"]["diverged"] == row["hybrid"]["diverged"] == 0 and row["accepted"] > 0.9
-    assert "| rk4-100ms | 0 | 0 |" in page.speed("stability", found)
+    assert "| rk4-100ms | 5 to 10 | 0 | 0 |" in page.speed("stability", found)
     with pytest.raises(InputError, match="seeds are kept"):
         stability.measure(10_000, 4.0)
 

@@ -119,7 +119,8 @@ def test_every_shipped_corrector_fits_its_turbine():
     from fatigue_runner.turbine import load_turbine
 
     for corrector in library.correctors():
-        corrector.bind(load_turbine(corrector.turbine), corrector.method, corrector.step)
+        there = load_turbine(corrector.turbine).operated(corrector.binding.operation)
+        corrector.bind(there, corrector.method, corrector.step)
         assert corrector.validation
         assert corrector.recipe
 

@@ -66,7 +66,7 @@ def test_a_compiled_step_adds_the_defect_that_predict_says(made):
     wind = ConstantWind(7.4, 0.1)
     start = operating_points([wind])
     (run,) = simulate_block(turbine(), "heun", 0.05, [wind], start, 2.0, corrector=corrector)
-    pieces = samples.wind_pieces(wind, run.time[:-1], 0.05)
+    pieces = samples.wind_pieces(turbine(), wind, run.time[:-1], 0.05)
     steps = samples.single_steps(turbine(), "heun", 0.05, run.state[:-1], pieces)
     difference = np.abs(steps.plain + corrector.predict(steps) - run.state[1:])
     assert (difference <= 1e-12 * (1 + np.abs(run.state[1:]))).all()

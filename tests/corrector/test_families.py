@@ -58,7 +58,7 @@ class MeanDefect(Map):
     mean: np.ndarray
     layout: Layout = T2B1I1CG
 
-    def data(self, binding, turbine, pitch):
+    def data(self, binding, turbine, run):
         return MeanDefectData(np.repeat(self.mean * binding.size, LANES))
 
     def check(self, method, guard):
@@ -133,7 +133,7 @@ def test_a_family_in_one_file_is_trained_shown_and_run(toy, tmp_path):
     for mode in ("enhanced", "hybrid"):
         (case,) = simulate_block(turbine(), "heun", 0.02, [wind], start, 0.02, corrector=corrector, mode=mode)
         if mode == "enhanced" or case.accepted[0]:
-            pieces = samples.wind_pieces(wind, case.time[:1], 0.02)
+            pieces = samples.wind_pieces(turbine(), wind, case.time[:1], 0.02)
             step = samples.single_steps(turbine(), "heun", 0.02, start, pieces)
             assert case.state[1] == pytest.approx((step.plain + corrector.predict(step))[0], rel=1e-12)
     assert np.abs(corrector.predict(step)).max() > 1e-9
@@ -185,8 +185,8 @@ def test_a_shipped_recipe_gives_the_shipped_corrector():
 def test_correctors_print_as_a_table_and_each_in_a_line():
     found = library.correctors()
     text = repr(found).splitlines()
-    assert text[0].split()[:4] == ["name", "family", "turbine", "method"]
+    assert text[0].split()[:5] == ["name", "family", "turbine", "operation", "method"]
     (row,) = (line for line in text if line.startswith("rk4-100ms "))
-    assert row.split()[:5] == ["rk4-100ms", "affine", "nrel5mw", "rk4", "100"]
+    assert row.split()[:6] == ["rk4-100ms", "affine", "nrel5mw", "fixed", "rk4", "100"]
     assert len(text) == len(found) + 2 and max(map(len, text)) < 120
     assert repr(library.find("rk4-100ms")) == "Corrector('rk4-100ms', affine, nrel5mw, rk4 at 100 ms)"

@@ -192,11 +192,22 @@ def stability(result: dict[str, Any]) -> Table:
         return f"{value['diverged']}" + (f", first at {value['first']:.1f} s" if value["diverged"] else "")
 
     rows = [
-        [r["corrector"], lost(r[ENHANCED]), lost(r[HYBRID]), f"{r['accepted'] * 100:.2f} %"]
+        [
+            r["corrector"], r["wind"], lost(r[ENHANCED]), lost(r[HYBRID]), f"{r['accepted'] * 100:.2f} %",
+            f"{r['evaluations_per_second']:.1f}",
+        ]
         for r in result["rows"]
         if "refused" not in r
+    ]  # fmt: skip
+    headings = [
+        "corrector",
+        "wind [m/s]",
+        "enhanced diverged",
+        "hybrid diverged",
+        "hybrid accepted",
+        "evaluations/s",
     ]
-    return Table(["corrector", "enhanced diverged", "hybrid diverged", "hybrid accepted"], rows)
+    return Table(headings, rows)
 
 
 def logs(result: dict[str, Any]) -> Any:

@@ -10,9 +10,18 @@ import numpy as np
 from fatigue_runner.benchmark.study.cases import SEEDS
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import MODES, Ensemble, Integrator, simulate
+from fatigue_runner.turbine.turbine import FIXED
 
 FIRST_SEED = SEEDS.start + 100  # beyond those of campaigns/work_precision.yaml
 SPEEDS, INTENSITY = (5.0, 10.0), 0.14
+OPERATED_AT = (
+    4.0,
+    8.0,
+    11.4,
+    12.0,
+    18.0,
+    24.0,
+)  # m/s, of those for a turbine under control, which blow with six harmonics
 OUTPUT = 2.0  # s
 
 
@@ -21,37 +30,57 @@ def measure(
 ) -> dict[str, Any]:  # fmt: skip
     """{winds, duration, rows}: per corrector how many winds of `duration` [s] diverged, when first, and the share accepted.
 
-    chosen: correctors, default every shipped one that fits its turbine. Mean speeds 5 to 10 m/s, one seed each.
+    chosen: correctors, default every shipped one that fits its turbine. Mean speeds 5 to 10 m/s, one seed each; for those of a turbine that
+    operates, all seeds at each of `OPERATED_AT`, a row for each.
     Raises InputError for more seeds than are kept for benchmarks.
     """
     from fatigue_runner.corrector import correctors
+
+    if FIRST_SEED + seeds > SEEDS.stop:
+        raise InputError(f"at most {SEEDS.stop - FIRST_SEED} seeds are kept for benchmarks, got {seeds}")
+    rows = []
+    for c in correctors() if chosen is None else chosen:
+        if c.binding.operation == FIXED:
+            sets = [("5 to 10", np.linspace(*SPEEDS, seeds), 1)]
+        else:
+            sets = [(f"{v:g}", np.full(seeds, v), 6) for v in OPERATED_AT]
+        for named, speeds, harmonics in sets:
+            say(f"{c.name}, {named} m/s")
+            row = {"corrector": c.name, "wind": named}
+            try:
+                rows.append(row | _row(_ensemble(c, speeds, harmonics, duration), c))
+            except InputError as error:  # of another version of the turbine
+                rows.append(row | {"refused": str(error)})
+    return {"winds": seeds, "duration": duration, "rows": rows}
+
+
+def _ensemble(corrector: Any, speeds: np.ndarray, harmonics: int, duration: float) -> Ensemble:
+    """Winds of these mean speeds [m/s], a seed each, on the turbine that the corrector is for."""
     from fatigue_runner.integrators.initial import initial_state
     from fatigue_runner.turbine import load_turbine
     from fatigue_runner.wind import TurbulentWind
 
-    if FIRST_SEED + seeds > SEEDS.stop:
-        raise InputError(f"at most {SEEDS.stop - FIRST_SEED} seeds are kept for benchmarks, got {seeds}")
+    turbine = load_turbine(corrector.turbine).operated(corrector.binding.operation)
     winds = [
-        TurbulentWind(float(v), intensity=INTENSITY, seed=FIRST_SEED + i, duration=duration, harmonics=1)
-        for i, v in enumerate(np.linspace(*SPEEDS, seeds))
+        TurbulentWind(
+            float(v), intensity=INTENSITY, seed=FIRST_SEED + i, duration=duration, harmonics=harmonics
+        )
+        for i, v in enumerate(speeds)
     ]
-    rows = []
-    for c in correctors() if chosen is None else chosen:
-        turbine = load_turbine(c.turbine)
-        start = np.array([initial_state(turbine, "operating-point", w) for w in winds])
-        say(c.name)
-        try:
-            rows.append(_row(Ensemble(turbine, winds, start, duration, min(OUTPUT, duration)), c))
-        except InputError as error:  # of another version of the turbine
-            rows.append({"corrector": c.name, "refused": str(error)})
-    return {"winds": seeds, "duration": duration, "rows": rows}
+    starts: dict[float, Any] = {}
+    for wind in winds:
+        if wind.mean_speed not in starts:
+            starts[wind.mean_speed] = initial_state(turbine, "operating-point", wind)
+    initial = np.array([starts[wind.mean_speed] for wind in winds])
+    return Ensemble(turbine, winds, initial, duration, min(OUTPUT, duration))
 
 
 def _row(ensemble: Ensemble, corrector: Any) -> dict[str, Any]:
-    row: dict[str, Any] = {"corrector": corrector.name}
+    row: dict[str, Any] = {}
     for mode in MODES:
         runs = simulate(ensemble, Integrator(corrector.method, corrector.step, corrector, mode))
         lost = [r.diverged_at for r in runs if r.diverged_at is not None]
         row[mode] = {"diverged": len(lost), "first": min(lost, default=None)}
     row["accepted"] = float(np.mean([r.accepted.mean() for r in runs]))
+    row["evaluations_per_second"] = float(np.mean([r.evaluations for r in runs])) / ensemble.duration
     return row

@@ -2,8 +2,11 @@
 
 Keys beside those of `closed_form`:
 history            earlier nonlinear parts that the map sees, where that is more than the method's own (default 0)
+wind_bins          mean winds [m/s], a list or `{start, stop, count}`: a map for each, and a case takes the nearest one's; default one
+                   map for all
 generator_damping  added to the linear part's [1/s] (default 0)
-guard              norm (`max`, `rms`), kappa (2), quantile (0.999; 1: the largest), rtol (0); the fallback is the method as it is
+guard              norm (`max`, `rms`), kappa (2), quantile (0.999; 1: the largest), rtol (0); compared with the method as it is
+                   and with what was predicted; what is refused is made anew in substeps of RK4
 
 The predictor is fitted first; then runs that are put back on the true trajectory before every step, with the fitted predictor, give the
 rows and defects of the corrector. The samples lie on the trajectories.
@@ -11,26 +14,38 @@ rows and defects of the corrector. The samples lie on the trajectories.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
 
-from fatigue_runner.corrector import features, samples, steps
-from fatigue_runner.corrector.coordinates import from_fixed, to_fixed
+from fatigue_runner.corrector import features, samples, steps, threshold
+from fatigue_runner.corrector.coordinates import to_fixed
 from fatigue_runner.corrector.families.closed_form import ClosedForm
 from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.maps import MultiBladeMap
+from fatigue_runner.corrector.maps.map import place
 from fatigue_runner.corrector.maps.multi_blade import MOST_DAMPING, past_of
-from fatigue_runner.corrector.recipe import Array, GuardRecipe, Learned, Progress
+from fatigue_runner.corrector.recipe import Array, GuardRecipe, Learned, Progress, Speeds, speeds_of
 from fatigue_runner.corrector.threshold import limit_of
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.section import problem
+from fatigue_runner.integrators import multi_blade
+from fatigue_runner.integrators.tableaux import RK4
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
+
+
+Numbers = NDArray[np.int64]
+
+# Of a state whose equation is linear (a filter's) the nonlinear part is what finite differences leave of it, 1e-8 [SI]; those of the
+# others are above 1e-3. Scaled to unit size, it would get weights that amplify the last bits.
+ROUNDING = 1e-6
 
 
 class MultiBladeRecipe(ClosedForm):
@@ -41,6 +56,7 @@ class MultiBladeRecipe(ClosedForm):
     family: Literal["affine"]
     history: int = Field(default=0, ge=0, le=features.MOST_HISTORY)
     generator_damping: float = Field(default=0.0, ge=0, lt=MOST_DAMPING)
+    wind_bins: Speeds | None = None
     guard: GuardRecipe = GuardRecipe()
 
     @field_validator("factors")
@@ -52,10 +68,34 @@ class MultiBladeRecipe(ClosedForm):
             raise problem(str(error)) from None
         return value
 
+    @property
+    def bins(self) -> tuple[float, ...]:
+        """Of mean winds [m/s]; none: one map for all."""
+        return () if self.wind_bins is None else tuple(speeds_of(self.wind_bins))
+
+    def in_bins(self, speeds: Array, what: Callable[[Numbers], Any]) -> list[Any]:
+        """What is made of the samples of each bin, or of all: `what` gets their numbers; speeds (n,): of the samples' winds [m/s]."""
+        if not self.bins:
+            return [what(np.arange(len(speeds)))]
+        nearest = np.abs(speeds[:, None] - np.array(self.bins)).argmin(axis=1)
+        return [what(np.flatnonzero(nearest == number)) for number in range(len(self.bins))]
+
+    @model_validator(mode="after")
+    def _bins_have_winds(self) -> MultiBladeRecipe:
+        winds = np.array(self.training.speed_list)
+        for number in range(len(self.bins)):
+            if not np.any(np.abs(winds[:, None] - np.array(self.bins)).argmin(axis=1) == number):
+                raise problem(
+                    f"no wind of training is nearest to {self.bins[number]:g} m/s; leave the bin out, or give training more speeds",
+                    key="wind_bins",
+                )
+        return self
+
     def train(self, turbine: Turbine, progress: Progress) -> Learned:
-        binding, layout = self.bound_to(turbine), turbine.layout
+        binding = self.bound_to(turbine)
         method, factors, damping = binding.found, tuple(self.factors), self.generator_damping
-        winds = self.training.build()
+        layout = multi_blade.seen_by(turbine, max(self.training.harmonics_list) > 1)
+        winds = [wind.on(turbine.rotor) for wind in self.training.build()]
         progress.say(f"reference trajectories under {len(winds)} winds")
         # whole steps: a sampled one begins at a step's end
         duration = float(np.floor(self.training.duration / self.step + 1e-9) * self.step)
@@ -63,28 +103,35 @@ class MultiBladeRecipe(ClosedForm):
         sampled = partial(
             steps.collect, turbine, method, self.step, past_of(method, self.history), winds, runs, self.samples, self.seed, damping
         )  # fmt: skip
+
+        def fitted(seen: Array, defect: Array) -> list[Array]:
+            turned = to_fixed(layout, defect, found.turn)
+            seen = np.where(np.sqrt((seen**2).mean(axis=0)) < ROUNDING, 0.0, seen)
+            return self.in_bins(found.speeds, lambda chosen: self.solve(layout, seen[chosen], turned[chosen]))
+
         progress.say(f"fitting the predictor to {len(winds) * self.samples} steps")
         found = sampled(None)
-        ahead = self.solve(layout, found.ahead_rows, to_fixed(layout, found.ahead_defect, found.turn))
+        ahead = fitted(found.ahead_rows, found.ahead_defect)
         progress.say("fitting the corrector")
-        found = sampled(ahead)
+        found = sampled(lambda speed: ahead[place(self.bins, speed)], self.bins)
         seen = found.multiplied(features.multi_blade_factor_rows(layout, factors))
-        learned = self.solve(layout, seen, to_fixed(layout, found.defect, found.turn))
-        guard = self._guard(
-            found,
-            from_fixed(layout, found.ahead_rows @ ahead.T, found.turn),
-            from_fixed(layout, seen @ learned.T, found.turn),
-        )
+        learned = fitted(seen, found.defect)
+        substeps = threshold.fallback_substeps(turbine, RK4.name, self.step, 1)
         speeds = np.concatenate([run.wind[:, 0] for run in runs])
         facts: dict[str, Any] = {"samples": len(seen), "winds": len(winds), "seed": self.seed}
-        matrices = MultiBladeMap(
-            ahead / binding.size, learned / binding.size, factors, self.history, damping, layout
-        )
+        first, second = ((np.stack(w) if self.bins else w[0]) / binding.size for w in (ahead, learned))
+        matrices = MultiBladeMap(first, second, factors, self.history, damping, layout, self.bins)
+        guard = self._guard(matrices, binding.size, found, substeps)
         return Learned(matrices, guard, (float(speeds.min()), float(speeds.max())), facts)
 
-    def _guard(self, found: steps.Steps, moved: Array, change: Array) -> Guard:
-        """Of what the learned parts add to the predictor's and to the corrector's results (n, states)."""
-        guard = limit_of(change, found.plain, found.plain, **self.guard.threshold)
-        ahead = limit_of(moved, found.ahead, found.ahead, **self.guard.threshold)
-        # in units in which the corrector's limit is the predictor's as well
+    def _guard(self, learned: MultiBladeMap, size: float, found: steps.Steps, substeps: int) -> Guard:
+        """Of what the learned part adds to the method's results, and of the distance from the predicted ones.
+
+        In one unit for all wind bins: so the steps that are made anew are spent where the errors are large.
+        """
+        change = learned.predict(found, size)
+        predicted = found.ahead + learned.predict_ahead(found, size)
+        guard = limit_of(change, found.plain, found.plain, **self.guard.threshold, substeps=substeps)
+        ahead = limit_of(found.plain + change - predicted, found.plain, predicted, **self.guard.threshold)
+        # in units in which the one limit is the other's as well
         return replace(guard, ahead_atol=tuple(a * ahead.limit / guard.limit for a in ahead.atol))

@@ -191,7 +191,9 @@ def along_trajectories(
     sampling = sampling or step
     runs = accurate_runs(turbine, winds, initial, duration, sampling, sampling)
     states = np.concatenate([run.state[:-1] for run in runs])
-    pieces = np.concatenate([wind_pieces(w, run.time[:-1], step) for w, run in zip(winds, runs, strict=True)])
+    pieces = np.concatenate(
+        [wind_pieces(turbine, w, run.time[:-1], step) for w, run in zip(winds, runs, strict=True)]
+    )
     sets = [states]
     rng, scale = np.random.Generator(np.random.PCG64(seed)), np.std(states, axis=0)
     sets += [states + moves(rng, states.shape, scale, perturbation, turbine) for _ in range(perturbed)]

@@ -26,6 +26,19 @@ Array = NDArray[np.float64]
 MAPS: dict[str, type[Map]] = {}
 
 
+def place(bins: Sequence[float], speed: float) -> int:
+    """Number of the bin nearest to a mean wind speed [m/s]; 0 where there are none."""
+    return int(np.argmin(np.abs(np.array(bins) - speed))) if bins else 0
+
+
+class Run(NamedTuple):
+    """For which runs a map is made ready: pitch [rad], mean wind speed [m/s], whether the equations take azimuthal harmonics."""
+
+    pitch: float = 0.0
+    speed: float = 0.0
+    harmonics: bool = False
+
+
 class Sampled(Protocol):
     """n sampled steps as a kind of map sees them: beside what is its own, the plain results (n, states) and what they lack."""
 
@@ -70,9 +83,18 @@ class Map(ABC):
     def damping(self) -> float:
         return 0.0
 
+    @property
+    def bins(self) -> tuple[float, ...]:
+        """Mean winds [m/s] for each of which there is a map; none: one for all."""
+        return ()
+
+    def bin_of(self, speed: float) -> int:
+        """Number of the bin whose wind is nearest to a mean wind speed [m/s]."""
+        return place(self.bins, speed)
+
     @abstractmethod
-    def data(self, binding: Binding, turbine: Turbine, pitch: float) -> NamedTuple:
-        """The arrays that the compiled loop reads, scaled to the defect; pitch [rad]."""
+    def data(self, binding: Binding, turbine: Turbine, run: Run) -> NamedTuple:
+        """The arrays that the compiled loop reads, scaled to the defect."""
 
     # --- its consistency ---
 
@@ -125,6 +147,8 @@ class Map(ABC):
     def _sees_more(self, factors: Sequence[str]) -> str:
         """The same for a map that multiplies what it sees with `factors` and looks back."""
         by = f" x (1, {', '.join(factors)})" if factors else ""
+        if self.bins:
+            by += f", {len(self.bins)} maps for mean winds of {self.bins[0]:g} to {self.bins[-1]:g} m/s"
         looks = f", looks back {self.history} step(s)" if self.history else ""
         return self.kind + by + looks
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 from fatigue_runner.corrector import features, samples
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.maps import layers as dense
-from fatigue_runner.corrector.maps.map import Array, Map
+from fatigue_runner.corrector.maps.map import Array, Map, Run
 from fatigue_runner.integrators.protocol import RawNetworkData
 from fatigue_runner.layout import T2B1I1CG, Layout
 
@@ -41,7 +41,7 @@ class RawNetwork(Map):
             raise CorrectorError(f"its guard bounds {len(guard.low)} features, there are {inputs}")
         dense.check(self.layers, inputs, self.layout.size, self.activation)
 
-    def data(self, binding: Binding, turbine: Turbine, pitch: float) -> RawNetworkData:
+    def data(self, binding: Binding, turbine: Turbine, run: Run) -> RawNetworkData:
         return RawNetworkData(*dense.packed(self.layers, self.activation, binding.size))
 
     def sample(

@@ -11,7 +11,7 @@ import numpy as np
 from fatigue_runner.corrector import features, samples
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.maps import layers as dense
-from fatigue_runner.corrector.maps.map import Array, Map
+from fatigue_runner.corrector.maps.map import Array, Map, Run
 from fatigue_runner.integrators.protocol import StageMapData
 from fatigue_runner.layout import T2B1I1CG, Layout
 
@@ -63,7 +63,7 @@ class StageMap(Map):
     def _factor_rows(self) -> tuple[int, ...]:
         return features.factor_rows(self.layout, self.factors)
 
-    def data(self, binding: Binding, turbine: Turbine, pitch: float) -> StageMapData:
+    def data(self, binding: Binding, turbine: Turbine, run: Run) -> StageMapData:
         from fatigue_runner.integrators.dense import pack
 
         linear = np.zeros(0) if self.linear is None else pack(self.linear * binding.size)[0]
