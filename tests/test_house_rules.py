@@ -103,7 +103,7 @@ NO_STATES = {
                 "np.repeat(turbine.operating_point(8.0)[None], 16, axis=0)",
                 "pitch[:16]",
             ),
-            *("points[i % 16]", "range(16)", "speeds[i % 16]", "wind[:16]", "x[:16]"),
+            *("points[i % 16]", "range(16)", "wind[:16]", "x[:16]"),
         },
     ),
     "corrector/train_command.py": ("lines of a card", {"validation_rows(made.corrector)[:7]"}),

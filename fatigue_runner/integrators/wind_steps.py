@@ -20,19 +20,29 @@ LEAST = 2  # steps in a period of the highest harmonic: with fewer it is taken f
 RATIO = 7.5  # tip-speed ratio of a rotor whose speed nobody has given
 
 
-def refuse_unresolved(turbine: Turbine, wind: WindSource, state: Array, step: float) -> None:
-    """Raises InputError where `step` [s] has fewer than two steps in a period of the highest harmonic of the wind.
+def longest_step(turbine: Turbine, wind: WindSource, state: Array) -> float:
+    """[s] of which a period of the wind's highest harmonic has two; infinite where it has none beyond linear shears.
 
     state: in which the case starts; its rotor speed counts, or that of tip-speed ratio 7.5 where the rotor stands still.
     """
-    if wind.harmonics < 2:
-        return
+    return (
+        math.inf
+        if wind.harmonics < 2
+        else 2 * math.pi / (LEAST * wind.harmonics * _speed(turbine, wind, state))
+    )
+
+
+def _speed(turbine: Turbine, wind: WindSource, state: Array) -> float:
     speed = float(state[turbine.layout.rotor_speed])
-    if not speed > 0:
-        speed = RATIO * wind.mean_speed / turbine.rotor_radius
-    longest = 2 * math.pi / (LEAST * wind.harmonics * speed)
+    return speed if speed > 0 else RATIO * wind.mean_speed / turbine.rotor_radius
+
+
+def refuse_unresolved(turbine: Turbine, wind: WindSource, state: Array, step: float) -> None:
+    """Raises InputError where `step` [s] is above `longest_step`."""
+    longest = longest_step(turbine, wind, state)
     if step <= longest:
         return
+    speed = _speed(turbine, wind, state)
     held = math.floor(2 * math.pi / (LEAST * step * speed))
     fewer = f"at most {held} harmonics, or " if held > 1 else "1 harmonic, or "
     raise InputError(

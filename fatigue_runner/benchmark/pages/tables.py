@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -86,6 +87,27 @@ def duels(result: dict[str, Any]) -> Table:
         *("best classical at that NRMSE", "µs/s", "times cheaper: time", "evaluations", "accepted"),
     )
     return Table(head, rows)
+
+
+def in_winds(result: dict[str, Any]) -> Table:
+    """Every corrector in each mean wind, beside its method alone and the classical method with the fewest evaluations for its DEL error."""
+    rows = [
+        [
+            w.point.label, w.wind, optional(w.point.nrmse_max, ".1e"), _percent(w.point), _share(w.point.accepted),
+            f"{w.point.evaluations_per_second:.1f}", _percent(w.alone) if w.alone else "", _reached(w.rival),
+            f"{w.rival.evaluations:.1f}" if w.rival else "", optional(w.ratio, ".2f"),
+        ]
+        for w in answers.in_winds(result)
+    ]  # fmt: skip
+    head = (
+        *("corrector", "wind [m/s]", "NRMSE", "DEL error", "accepted", "evaluations/s", "method alone"),
+        *("fewest evaluations of a classical method", "evaluations/s", "times fewer"),
+    )
+    return Table(head, rows)
+
+
+def _percent(point: Point) -> str:
+    return "" if point.del_error_max is None else f"{point.del_error_max * 100:.2g} %"
 
 
 def _share(value: float | None) -> str:
@@ -194,20 +216,24 @@ def stability(result: dict[str, Any]) -> Table:
     rows = [
         [
             r["corrector"], r["wind"], lost(r[ENHANCED]), lost(r[HYBRID]), f"{r['accepted'] * 100:.2f} %",
-            f"{r['evaluations_per_second']:.1f}",
+            f"{r['evaluations_per_second']:.1f}", *_stability_errors(r),
         ]
         for r in result["rows"]
         if "refused" not in r
     ]  # fmt: skip
     headings = [
-        "corrector",
-        "wind [m/s]",
-        "enhanced diverged",
-        "hybrid diverged",
-        "hybrid accepted",
-        "evaluations/s",
-    ]
+        *("corrector", "wind [m/s]", "enhanced diverged", "hybrid diverged", "hybrid accepted", "evaluations/s"),
+        *("NRMSE, hybrid", "method alone", "fallback alone"),
+    ]  # fmt: skip
     return Table(headings, rows)
+
+
+def _stability_errors(row: dict[str, Any]) -> list[str]:
+    """Of the hybrid, of its method and of its fallback; empty where they were not measured."""
+    if "nrmse" not in row:
+        return [""] * 3
+    found = [row["nrmse"].get(name, math.nan) for name in ("hybrid", "alone", "fallback")]
+    return ["diverged" if e is None else "" if math.isnan(e) else f"{e:.1e}" for e in found]
 
 
 def logs(result: dict[str, Any]) -> Any:

@@ -7,6 +7,7 @@ from typing import Any
 from fatigue_runner.benchmark.study.answers import Answer, Reached, answers
 from fatigue_runner.benchmark.study.integrators import ADAPTIVE
 from fatigue_runner.channels import BY_NAME
+from fatigue_runner.turbine.turbine import FIXED
 
 
 def in_words(answer: Answer) -> str:
@@ -47,8 +48,9 @@ def winds(result: dict[str, Any]) -> str:
     """What the cases are."""
     kind = "turbulent" if result["turbulent"] else "constant"
     less = f", the first {result['discard']:g} s discarded" if result.get("discard") else ""
-    rate = f"{result['output_rate']:g} Hz"
-    return f"{len(result['winds'])} cases of {kind} wind, {result['duration']:g} s{less}, on `{result['turbine']}`, output at {rate}."
+    rate, steered = f"{result['output_rate']:g} Hz", result["operation"]
+    turbine = f"`{result['turbine']}`{'' if steered == FIXED else f' with `operation: {steered}`'}"
+    return f"{len(result['winds'])} cases of {kind} wind, {result['duration']:g} s{less}, on {turbine}, output at {rate}."
 
 
 def trust(result: dict[str, Any]) -> str:

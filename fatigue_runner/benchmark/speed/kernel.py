@@ -14,12 +14,14 @@ from typing import Any
 import numpy as np
 
 from fatigue_runner.benchmark.speed import machine, right_hand_side
-from fatigue_runner.channels import WIND_NAMES
+from fatigue_runner.layout import harmonic_channels
 from fatigue_runner.turbine.generated import kernel as collective
 from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.turbine import CONTROLLED
 
 CASES = (1, 8, 16, 64, 256)
 STEP_METHODS = ("heun", "rk3", "rk4", "tsit5", "dop853", "ab4", "abm4", "etdrk4", "etdabm3")
+OPERATED, HARMONICS = (4.0, 24.0), 3  # m/s and azimuthal harmonics of the winds of a turbine that operates
 LOOKUP_OPERATIONS = 6  # of one cubic: three multiplications and three additions
 
 
@@ -49,20 +51,28 @@ class _Operations(ast.NodeVisitor):
 
 
 def _work(
-    run: Callable[..., None], turbine: Any, cases: int, lanes: int, pitched: bool = False
+    run: Callable[..., None],
+    turbine: Any,
+    cases: int,
+    lanes: int,
+    pitched: bool = False,
+    speeds: tuple[float, float] = (5.0, 10.0),
+    harmonics: int = 0,
 ) -> Callable[[], float]:
     """A piece of work that returns nanoseconds per evaluation and case; one group after the other, as in a simulation.
 
-    pitched: every case has a pitch of its own, 0 to 8 degrees.
+    pitched: every case has a pitch of its own, 0 to 8 degrees; speeds: slowest and fastest wind [m/s]; harmonics: azimuthal ones,
+    0.3 m/s each.
     """
-    groups = -(-cases // lanes)
-    speeds = np.linspace(5.0, 10.0, 16)
-    points = [turbine.operating_point(v) for v in speeds]
+    groups, winds = -(-cases // lanes), np.linspace(*speeds, 16)
+    points, signals = [turbine.operating_point(v) for v in winds], harmonic_channels(harmonics)
     x = np.empty((groups, turbine.layout.size, lanes))
-    wind, pitch = np.zeros((groups, len(WIND_NAMES), lanes)), np.zeros((groups, 1, lanes))
+    wind = np.zeros((groups, turbine.layout.wind_size(signals), lanes))
+    wind[:, turbine.layout.wind_rows(signals)] = 0.3
+    pitch = np.zeros((groups, 1, lanes))
     for i in range(groups * lanes):
         x[i // lanes, :, i % lanes] = points[i % 16]
-        wind[i // lanes, 0, i % lanes] = speeds[i % 16]
+        wind[i // lanes, 0, i % lanes] = winds[i % len(winds)]
         pitch[i // lanes, 0, i % lanes] = np.radians(i % 16 / 2)
     arguments = right_hand_side.arguments(turbine, x[:16], wind[:16], pitch[:16] if pitched else None)
     repeats = max(1, 16000 // groups // max(1, lanes // 2))
@@ -79,6 +89,13 @@ def _work(
 def one_evaluation(turbine: Any, cases: int = CASES[-1]) -> Callable[[], float]:
     """A piece of work that returns nanoseconds per evaluation and case of the turbine's packed kernel."""
     return _work(right_hand_side.packed_of(turbine), turbine, cases, LANES)
+
+
+def in_operation(turbine: Any, cases: int = CASES[-1]) -> Callable[[], float]:
+    """The same of the turbine under its controller, below and above rated, with azimuthal harmonics."""
+    operated = turbine.operated(CONTROLLED)
+    run = right_hand_side.packed_of(operated, harmonics=True)
+    return _work(run, operated, cases, LANES, speeds=OPERATED, harmonics=HARMONICS)
 
 
 def peak() -> Callable[[], float]:
@@ -159,6 +176,7 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
     work = {f"packed {n}": _work(packed, turbine, n, LANES) for n in CASES}
     work |= {f"scalar {n}": _work(scalar, turbine, n, 1) for n in CASES}
     work["own edges"] = one_evaluation(load_turbine("nrel5mw_edges"))
+    work["operation"] = in_operation(turbine)
     work["pitched"] = _work(right_hand_side.varying(), turbine, CASES[-1], LANES, pitched=True)
     work |= {f"step {name}": whole_steps(turbine, name) for name in STEP_METHODS}
     work["peak"] = peak()
@@ -192,6 +210,11 @@ def measure(repeats: int = 15, turbine_name: str = "nrel5mw") -> dict[str, Any]:
         "share_of_peak": flops / best / rate,
         "cases": rows,
         "varying_pitch": found["pitched"],
+        "operation": {
+            "time": found["operation"],
+            "ratio": found["operation"]["median"] / best,
+            "harmonics": HARMONICS,
+        },
         "own_edges": {"time": found["own edges"], "ratio": found["own edges"]["median"] / best},
         "whole_steps": steps,
     }

@@ -38,9 +38,9 @@ def packed() -> Callable[..., None]:
     return _repeated(kernel.rhs)
 
 
-def packed_of(turbine: Any) -> Callable[..., None]:
-    """The same with the equations of another turbine."""
-    return _repeated(turbine.kernel_data(0.0).model.generated.rhs)
+def packed_of(turbine: Any, harmonics: bool = False) -> Callable[..., None]:
+    """The same with the equations of another turbine, or of one that operates; harmonics: those that take azimuthal ones."""
+    return _repeated(turbine.kernel_data(0.0, harmonics).model.generated.rhs)
 
 
 def varying() -> Callable[..., None]:
@@ -76,9 +76,10 @@ def arguments(
 ) -> Sequence[tuple[Any, ...]]:
     """What a repeated evaluation takes after the number of repeats, per group of lanes, in memory of its own as in a simulation.
 
-    states (groups, 16, lanes), wind (groups, 3, lanes), pitch [rad] (groups, 1, lanes) where it varies.
+    states (groups, size, lanes), wind (groups, 3 or more, lanes), pitch [rad] (groups, 1, lanes) where it varies.
     """
-    data = turbine.kernel_data(0.0) if pitch is None else turbine.pitched_kernel_data()
+    more = wind.shape[1] > len(turbine.layout.wind)
+    data = turbine.kernel_data(0.0, more) if pitch is None else turbine.pitched_kernel_data(more)
     tables = aligned(data.tables) if pitch is None else data.tables
     lanes = states.shape[2]
     controls = np.zeros((len(states), 0, lanes)) if pitch is None else pitch

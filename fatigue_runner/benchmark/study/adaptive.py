@@ -77,7 +77,11 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
     times = np.arange(round(duration / cases.output_step) + 1) * cases.output_step
     f = right_hand_side.of_one_case(turbine, wind, duration, cases.pitch)
     scale = ranges(cases, number)
-    q_rows, v_rows = turbine.layout.positions, turbine.layout.velocities
+    q_rows, v_rows, u_rows = (
+        turbine.layout.positions,
+        turbine.layout.velocities,
+        turbine.layout.first_order_rows,
+    )
     begin = time.perf_counter()
     stepper = solver(name)(f, 0.0, initial, duration, rtol=tolerance, atol=ABSOLUTE * tolerance * scale)
     states, filled = np.empty((len(times), len(initial))), 1
@@ -87,7 +91,9 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
         stepper.step()
         h = stepper.t - stepper.t_old
         while filled < len(times) and times[filled] <= stepper.t + 1e-12:
-            q, v = hermite_weights((times[filled] - stepper.t_old) / h, (0.0, 1.0))
+            place = (times[filled] - stepper.t_old) / h
+            q, v = hermite_weights(place, (0.0, 1.0))
+            u, _ = hermite_weights(place, (0.0, 1.0), 2)
             given = np.stack(
                 [
                     old[q_rows],
@@ -98,7 +104,8 @@ def solve(cases: Cases, number: int, name: str, tolerance: float) -> Solved:
                     h * h * stepper.f[v_rows],
                 ]
             )
-            states[filled] = np.concatenate([q @ given, v @ given / h])
+            ends = np.stack([old[u_rows], h * old_slope[u_rows], stepper.y[u_rows], h * stepper.f[u_rows]])
+            states[filled] = np.concatenate([q @ given, v @ given / h, u @ ends])
             filled += 1
         old, old_slope = stepper.y.copy(), stepper.f.copy()
     seconds = time.perf_counter() - begin

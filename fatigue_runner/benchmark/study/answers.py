@@ -206,3 +206,32 @@ def duels(result: dict[str, Any], error: Error = nrmse) -> list[Duel]:
             rivals[cost] = found[0] if found else None
         out.append(Duel(p, own, rivals))
     return out
+
+
+@dataclass(frozen=True)
+class InWind:
+    """A corrected point in one mean wind; alone: the method without its corrector at the same step; rival: the classical method with
+    the fewest evaluations for at most the corrected one's DEL error there."""
+
+    wind: str
+    point: Point
+    alone: Point | None
+    rival: Reached | None
+
+    @property
+    def ratio(self) -> float | None:
+        """How many times fewer evaluations than the rival."""
+        return None if self.rival is None else self.rival.evaluations / self.point.evaluations_per_second
+
+
+def in_winds(result: dict[str, Any]) -> list[InWind]:
+    """Every corrected point that did not diverge in each mean wind of a turbine that operates; nothing of others."""
+    out = []
+    usable = [p for p in result["points"] if p.by_wind and not p.diverged]
+    for corrected in (p for p in usable if p.corrected):
+        for wind in corrected.by_wind:
+            own, plain = corrected.at(wind), [p.at(wind) for p in usable if not p.corrected]
+            same = (p for p in plain if p.method == own.method and math.isclose(p.step, own.step))
+            found = ranking(plain, "evaluations", del_error, own.del_error_max or 0.0)
+            out.append(InWind(wind, own, next(same, None), found[0] if found else None))
+    return out

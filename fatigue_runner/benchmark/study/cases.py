@@ -22,7 +22,9 @@ from fatigue_runner.inputs.source import Source
 from fatigue_runner.inputs.sweep import Sweep, expand
 from fatigue_runner.integrators import Ensemble, Integrator
 from fatigue_runner.integrators.pitch import PitchSeries
+from fatigue_runner.integrators.wind_steps import longest_step
 from fatigue_runner.trajectory import Trajectory
+from fatigue_runner.turbine.turbine import FIXED
 
 # Seeds 9000 to 9999 are the benchmarks': correctors are trained on seeds from 100,000 on.
 SEEDS = range(9000, 10_000)
@@ -110,6 +112,21 @@ class Cases:
         """[rad]; a benchmark has one."""
         assert not isinstance(self.ensemble.pitch, PitchSeries)
         return self.ensemble.pitch
+
+    @property
+    def longest_step(self) -> float:
+        """[s]: beyond, the winds' harmonics are taken for slower ones, and a run is refused."""
+        e = self.ensemble
+        return min(longest_step(e.turbine, wind, x) for wind, x in zip(e.winds, e.initial, strict=True))
+
+    @property
+    def by_wind(self) -> dict[str, list[int]]:
+        """{mean speed [m/s] as text: numbers of its cases}, the slowest first, where the turbine operates and each wind is another
+        turbine; else nothing."""
+        if self.ensemble.turbine.operation == FIXED:
+            return {}
+        speeds = [wind.mean_speed for wind in self.ensemble.winds]
+        return {f"{v:g}": [i for i, own in enumerate(speeds) if own == v] for v in sorted(set(speeds))}
 
     @property
     def turbulent(self) -> bool:

@@ -41,7 +41,7 @@ def rungs(cases: Cases, settings: Settings, method: str, largest: float) -> tupl
     from fatigue_runner.integrators import method as find
 
     cost = find(method).evaluations_per_step
-    ladder = [s for s in settings.ladder if s <= cases.duration]
+    ladder = [s for s in settings.ladder if s <= min(cases.duration, cases.longest_step)]
     start = max([i for i, s in enumerate(ladder) if s > largest], default=0)
     fine = [s for s in ladder if cost / s <= settings.most_evaluations]
     reason = ""
@@ -54,14 +54,14 @@ def rungs(cases: Cases, settings: Settings, method: str, largest: float) -> tupl
 
 
 def fitting(cases: Cases, settings: Settings) -> tuple[list[Integrator], list[str]]:
-    """All correctors for the cases' turbine in all modes, those the campaign lists, and the listed methods; and what was left
-    out, with the reason."""
+    """All correctors for the cases' turbine as it is operated, in all modes, those the campaign lists, and the listed methods; and what
+    was left out, with the reason."""
     from fatigue_runner.corrector import correctors, find
 
     turbine, found, left_out = cases.ensemble.turbine, [], []
     shipped = correctors() if settings.correctors is None else [find(name) for name in settings.correctors]
     for c in shipped:
-        if c.turbine != turbine.name:
+        if c.turbine != turbine.name or c.binding.operation != turbine.operation:
             continue
         try:
             c.bind(turbine, c.method, c.step)

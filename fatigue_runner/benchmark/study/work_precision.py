@@ -156,9 +156,14 @@ def errors(sets: Sequence[Cases], settings: Settings, workers: int, say: Say) ->
 
 
 def _empty(cases: Cases, settings: Settings) -> dict[str, Any]:
+    long = [f"{step * 1e3:g}" for step in settings.ladder if step > cases.longest_step]
+    unresolved = (
+        [f"steps of {', '.join(long)} ms: too long for the wind's azimuthal harmonics"] if long else []
+    )
     return {
         "cases": cases.name,
         "turbine": cases.ensemble.turbine.name,
+        "operation": cases.ensemble.turbine.operation,
         "turbulent": cases.turbulent,
         "winds": [w.name for w in cases.ensemble.winds],
         "duration": cases.duration,
@@ -168,7 +173,7 @@ def _empty(cases: Cases, settings: Settings) -> dict[str, Any]:
         "points": [],
         "adaptive": [],
         "stability_limits": [],
-        "left_out": fitting(cases, settings)[1],
+        "left_out": fitting(cases, settings)[1] + unresolved,
     }
 
 
