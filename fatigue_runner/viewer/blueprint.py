@@ -201,7 +201,8 @@ def _plot(
     labels = [_label(case, path, cases) for path in paths for case in cases]
     several = len(labels) > 1
     # curves below each other end at the same place, with a legend or without
-    letters = max(map(len, labels)) if live or len(cases) > 1 else max(len("discrepancy"), *map(len, labels))
+    letters = max(map(len, labels)) if several else 0
+    letters = letters if live or len(cases) > 1 else max(len("discrepancy"), letters)
     room = 0.0 if live and not several else min(0.45, (42.0 + 7.0 * letters) / width)
     top = 0.0 if live or _whole(cases) or not several else min(0.6, 0.125 * len(labels))
     return rrb.TimeSeriesView(

@@ -32,7 +32,9 @@ def set_style(recording: rr.RecordingStream, case: Viewed, several: bool) -> Non
         # the wind at the blades is told of one case, the others have the same
         if not several or channel in BLADE_WIND:
             name = short_label(channel.label)
-            colour = colours.BLADES[blade - 1] if blade else colours.INTEGRATORS[0]
+            # the pitch shares a plot with the rotor's speed
+            other = 1 if channel.name == "blade_pitch" else 0
+            colour = colours.BLADES[blade - 1] if blade else colours.INTEGRATORS[other]
         if group == "wind" and blade is None and not several:
             colour = _signal_colour(channel.name)
         style = rr.SeriesLines(names=name, colors=colour, widths=1.6 if not case.is_reference else 2.6)
