@@ -1,6 +1,7 @@
 """The command line: parses and prints, decides nothing.
 
-Exit codes: 0 all done; 1 some cases failed or diverged; 2 the input was wrong; 130 interrupted, resumable.
+Exit codes: 0 all done; 1 some cases failed or diverged; 2 the input was wrong; 130 interrupted, resumable (143 by SIGTERM, 129 by
+SIGHUP).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import typer
 from typer.core import TyperGroup
 
 from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning
+from fatigue_runner.interruption import exit_code_of
 from fatigue_runner.terminal import console, write_plainly
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ MOUNTED = {
     "train": "fatigue_runner.corrector.train_command",
     "correctors": "fatigue_runner.corrector.commands",
     "benchmark": "fatigue_runner.benchmark.commands",
+    "version": "fatigue_runner.version_command",
 }
 
 
@@ -161,8 +164,10 @@ def run(
             results = run_campaign(
                 campaign, out, workers=workers, fresh=fresh, dask=dask, console=to, watch=watch
             )
-        except KeyboardInterrupt:
-            raise CampaignInterrupted("interrupted; the same command goes on") from None
+        except KeyboardInterrupt as interrupt:
+            raise CampaignInterrupted(
+                "interrupted; the same command goes on", exit_code_of(interrupt)
+            ) from None
     _print_outcome(results, to)
     raise typer.Exit(results.exit_code)
 

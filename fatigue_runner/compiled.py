@@ -11,9 +11,11 @@ from __future__ import annotations
 import hashlib
 import multiprocessing
 import os
+import pickle
 import re
 import tempfile
 import warnings
+import zlib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -107,15 +109,32 @@ def _prune(base: Path) -> None:
 
 
 class _Index(IndexDataCacheFile):
-    """What is in the cache. One that names a module which is no longer there is empty: a family of somebody's own, say, in a
-    file outside of the package, would else keep every other from being loaded."""
+    """What is in the cache; each file ends with a checksum, since machine code with a flipped bit is not run but made again.
+
+    An index that is damaged, or names a module which is no longer there, is empty: a family of somebody's own, say, in a file outside
+    of the package, would else keep every other from being loaded.
+    """
+
+    def _dump(self, obj: Any) -> bytes:
+        pickled: Any = super()._dump
+        data: bytes = pickled(obj)
+        return data + zlib.crc32(data).to_bytes(4, "little")
 
     def _load_index(self) -> Any:
         load: Any = super()._load_index
         try:
+            with open(self._index_path, "rb") as file:
+                pickle.load(file)  # numba's version
+                _refuse_damaged(file.read())
             return load()
-        except (ImportError, AttributeError):
+        except Exception:  # unpickling damaged bytes raises anything
             return {}
+
+    def _load_data(self, name: str) -> Any:
+        load: Any = super()._load_data
+        path: Any = self._data_path
+        _refuse_damaged(Path(path(name)).read_bytes())
+        return load(name)
 
     def save(self, key: Any, data: Any) -> None:
         keep: Any = super().save
@@ -123,6 +142,12 @@ class _Index(IndexDataCacheFile):
             keep(key, data)
         except OSError:  # the disk is full: the kernel runs all the same
             _warn_once()
+
+
+def _refuse_damaged(data: bytes) -> None:
+    """Raises OSError, which numba takes for a file that is not there."""
+    if zlib.crc32(data[:-4]).to_bytes(4, "little") != data[-4:]:
+        raise OSError("damaged")
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -235,3 +235,11 @@ def test_what_will_be_written_after_long_work_is_refused_before_it(tmp_path):
     ):  # fmt: skip
         with pytest.raises(InputError, match=said):
             check()
+
+
+def test_version_tells_what_a_report_of_a_bug_needs():
+    from fatigue_runner.version_command import facts
+
+    told = facts()
+    assert told["fatigue-runner"] == fatigue_runner.__version__ and told["numba"][0].isdigit()
+    assert {"code", "system", "kernel cache", "torch"} <= told.keys()

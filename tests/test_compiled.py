@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -142,3 +143,32 @@ def test_a_cache_that_names_a_module_which_is_gone_is_made_anew(tmp_path):
         )
         assert done.returncode == 0, done.stderr
         (tmp_path / "own.py").unlink(missing_ok=True)
+
+
+def test_a_damaged_kernel_in_the_cache_is_not_run_but_made_anew(tmp_path):
+    """Numbers from machine code with a flipped bit are wrong in silence, or end the process."""
+    (tmp_path / "made.py").write_text(
+        "from fatigue_runner.compiled import njit\n\n\n@njit()\ndef twice(x):\n    return 2.0 * x\n"
+    )
+    code = "import made; print(made.twice(21.0), dict(made.twice.stats.cache_hits) != {})"
+    environment = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(compiled.__file__).parents[1])]),
+    }
+
+    def run() -> str:
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+        assert not done.stderr, done.stderr
+        return done.stdout.strip()
+
+    assert (run(), run()) == ("42.0 False", "42.0 True")
+    for kind in ("*.nbc", "*.nbi"):
+        for place in (0.02, 0.5, 0.98):
+            (file,) = (tmp_path / "cache").rglob(kind)
+            whole = file.read_bytes()
+            at = int(place * len(whole))
+            file.write_bytes(whole[:at] + bytes([whole[at] ^ 16]) + whole[at + 1 :])
+            assert run() == "42.0 False", (kind, place)
+            file.write_bytes(file.read_bytes()[:20])
+            assert run() == "42.0 False", (kind, "cut")

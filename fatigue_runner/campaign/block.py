@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,13 +87,14 @@ def run_block(job: Job) -> list[dict[str, Any]]:
                 record = _finish(job, case, wind, outcome, own, reference) if case.id in wanted else None
             except Exception as error:  # one case's trouble (a full disk, a bad wind) must not end the others
                 source = None if isinstance(wind, Exception) else wind
-                failed = _record(
-                    case, failed_row(case, source, error, job.setup.campaign, job.setup.states), 0
-                )
+                failed = _record(case, failed_row(case, source, error, job.setup.campaign, job.setup.states))
                 record = failed if case.id in wanted else None
             if record is not None:
                 records.append(record)
-                leave(job.setup.logs.parent, job.cases[0].id, record)
+                with suppress(
+                    OSError
+                ):  # a full disk, a folder that is gone: the record comes back with the block's
+                    leave(job.setup.logs.parent, job.cases[0].id, record)
     return records
 
 
@@ -187,12 +189,12 @@ def _finish(
     job: Job, case: Case, wind: Any, trajectory: Trajectory, own: Evaluated, reference: Evaluated | None
 ) -> dict[str, Any]:
     """Write the log of a case and make its record."""
-    from fatigue_runner.logbook import write_log
+    from fatigue_runner.logbook import log_of
 
     campaign = job.setup.campaign
     row = make_row(case, wind, trajectory, own, reference, campaign)
     if not campaign.log.enabled:
-        return _record(case, row, 0)
+        return _record(case, row)
     path = job.setup.logs / f"{case.id}.mcap"
     identity = {
         **job.setup.metadata,
@@ -212,7 +214,7 @@ def _finish(
     error = None
     if reference is not None and not case.integration.is_reference and trajectory.diverged_at is None:
         error = scaled_error(trajectory, reference.whole)
-    write_log(
+    log = log_of(
         path,
         trajectory,
         identity,
@@ -223,8 +225,14 @@ def _finish(
         topics=campaign.log.topics,
         channels=campaign.logged,
     )
-    return _record(case, row, path.stat().st_size)
+    return _record(case, row, log.size, log.checksum)
 
 
-def _record(case: Case, row: dict[str, Any], log_bytes: int) -> dict[str, Any]:
-    return {"hash": case.hash, "simulation_hash": case.simulation_hash, "log_bytes": log_bytes, "row": row}
+def _record(case: Case, row: dict[str, Any], log_bytes: int = 0, log_checksum: int = 0) -> dict[str, Any]:
+    return {
+        "hash": case.hash,
+        "simulation_hash": case.simulation_hash,
+        "log_bytes": log_bytes,
+        "log_checksum": log_checksum,
+        "row": row,
+    }

@@ -196,7 +196,13 @@ def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:
 
 def _trained(integration: Integration) -> dict[str, float]:
     """The mean wind speeds [m/s] that a case's corrector was trained on."""
-    corrector = integration.build().corrector if integration.file else None
+    try:
+        corrector = integration.build().corrector if integration.file else None
+    except (
+        FatigueRunnerError,
+        OSError,
+    ):  # its file has gone while the campaign ran: that is said where its cases fail
+        corrector = None
     return (
         {}
         if corrector is None

@@ -54,7 +54,13 @@ def load_corrector(file: str, digest: str) -> Any:
     """The corrector, read once per process; refused where its file is not the one that the cases were made for."""
     from fatigue_runner.corrector import load
 
-    if file_hash(file) != digest:
+    try:
+        found = file_hash(file)
+    except OSError as error:
+        raise FatigueRunnerError(
+            f"corrector {file} has gone while the campaign ran ({error.strerror}); bring it back, and run it again"
+        ) from None
+    if found != digest:
         raise FatigueRunnerError(f"corrector {file} changed while the campaign ran; run it again")
     return load(file)
 

@@ -6,13 +6,14 @@ block, so that no two processes write one, on one machine or on several.
 
 from __future__ import annotations
 
-import json
 import shutil
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from fatigue_runner.results.records import to_line, whole_records
 
 FOLDER = "finished"  # in the run folder, while cases run
 EVERY = 0.5  # s between two looks
@@ -23,7 +24,7 @@ def leave(folder: Path, block: str, record: dict[str, Any]) -> None:
     path = folder / FOLDER / f"{block}.jsonl"
     path.parent.mkdir(exist_ok=True)
     with path.open("ab") as file:
-        file.write(json.dumps(record, allow_nan=False).encode() + b"\n")
+        file.write(to_line(record))
 
 
 class Pieces:
@@ -41,7 +42,7 @@ class Pieces:
                 file.seek(self._read.get(path.name, 0))
                 whole, newline, _ = file.read().rpartition(b"\n")
             self._read[path.name] = self._read.get(path.name, 0) + len(whole) + len(newline)
-            found += [json.loads(line) for line in whole.split(b"\n") if line]
+            found += whole_records(whole + newline)[0]
         return found
 
     def clear(self) -> None:

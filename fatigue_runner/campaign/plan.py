@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fatigue_runner.campaign.block import Job, Setup
+from fatigue_runner.campaign.bounds import winds_in_memory
 from fatigue_runner.campaign.cases import Case, blocks, make_cases
 from fatigue_runner.campaign.check import check
 from fatigue_runner.campaign.provenance import code_hash
@@ -16,9 +17,12 @@ from fatigue_runner.campaign.resolve import Resolved, ResolvedWind, resolve
 from fatigue_runner.campaign.spec import Campaign, read_campaign
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.channels import LOADS
+from fatigue_runner.results.columns import Column, table
 
-# Winds per block: the width of the lane kernel. A block is what progress counts in and what Ctrl-C can lose.
+# Winds per block: the width of the lane kernel.
 BLOCK_SIZE = 16
+# What a kill may cost: the workers' cases that are under way are at most this share of the campaign, down to half-filled lanes.
+AT_RISK = 0.1
 # of a log: fields of a status message, head and index of a message [bytes], what compression leaves (measured)
 STATUS_FIELDS, MESSAGE_BYTES, COMPRESSED = 7, 56.0, 0.75
 
@@ -46,6 +50,12 @@ class Plan:
         """What a run folder of this campaign must have in common with it."""
         common = self.campaign.model_dump(include={"name", "duration", "output_rate", "initial", "pitch"})
         return {"code": code_hash(), "turbine_hash": self.resolved.turbine.hash, **common}
+
+    @cached_property
+    def columns(self) -> list[Column]:
+        """Of the table of results, in their order."""
+        fatigue, states = self.campaign.fatigue, self.resolved.turbine.layout.states
+        return table(self.campaign.counted, fatigue.wohler_exponents, states, fatigue.angles)
 
     @property
     def logs_are_whole(self) -> bool:
@@ -88,7 +98,10 @@ class Plan:
         layout, sources = self.resolved.turbine.layout, [self.winds[wind].source for wind in pending]
         keys = [(source.cell_key, layout.wind_size(source.channels)) for source in sources]
         jobs = []
-        for winds in blocks(list(pending), keys, BLOCK_SIZE, workers):
+        at_risk = int(AT_RISK * len(self.cases) / workers)
+        size = min(BLOCK_SIZE, max(BLOCK_SIZE // 2, at_risk))
+        size = min(size, winds_in_memory(self.campaign.duration * self.campaign.output_rate))
+        for winds in blocks(list(pending), keys, size, workers):
             needed = [references[wind] for wind in winds if wind in references]
             cases = [case for wind in winds for case in pending[wind]]
             logged = {case.id for case in [*needed, *cases] if self.logs_are_whole and store.logged(case)}

@@ -1,19 +1,25 @@
-"""The only door to parallelism: joblib, on the cores of this machine (loky) or on a dask cluster."""
+"""The only door to parallelism: joblib, on the cores of this machine (loky) or on a dask cluster"""
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
+import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor
-from contextlib import AbstractContextManager
+from concurrent.futures import BrokenExecutor, CancelledError
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from typing import Any, TypeVar
 
 from fatigue_runner.errors import FatigueRunnerError, InputError
+from fatigue_runner.interruption import ENDING
 
 T = TypeVar("T")
 J = TypeVar("J")
+
+WATCH = 0.5  # s between two looks of a worker for its parent
 
 
 class WorkerEndedError(FatigueRunnerError):
@@ -42,35 +48,116 @@ def run_jobs(
     workers: processes on this machine; 1 runs in this one. dask: address of a scheduler, `tcp://host:8786`,
     instead. Closing the iterator, or an exception in its consumer, stops the jobs that have not started.
     """
+    if dask is None and min(workers, len(jobs)) <= 1:
+        for job in jobs:
+            yield beside(lambda job=job: function(job))  # type: ignore[misc]
+        return
+    yield from _run_in_processes(function, jobs, min(workers, len(jobs)), dask)
+
+
+def _run_in_processes(
+    function: Callable[[J], T], jobs: Sequence[J], workers: int, dask: str | None
+) -> Iterator[T]:
     import joblib
 
-    if dask is None:
-        workers = min(workers, max(len(jobs), 1))
     with _backend(joblib, workers, dask):
         parallel = joblib.Parallel(batch_size=1, return_as="generator_unordered")
-        results = parallel(joblib.delayed(_guarded)(function, job) for job in jobs)
+        with _born_deaf():
+            results = parallel(joblib.delayed(_guarded)(function, job) for job in jobs)
         try:
             yield from results
         except BrokenExecutor as error:  # of loky: TerminatedWorkerError
             raise WorkerEndedError(
                 "a worker process was ended from outside, most likely by the system for want of memory"
             ) from error
+        except Exception as error:
+            if dask is None or not _of_the_cluster(error):
+                raise
+            raise WorkerEndedError(
+                f"the dask scheduler at {dask} is lost ({type(error).__name__})"
+            ) from error
         finally:
-            results.close()
+            with suppress(Exception) if dask is not None else nullcontext():
+                results.close()
+
+
+def _of_the_cluster(error: Exception) -> bool:
+    """Whether it says that scheduler or workers cannot be reached, not that a job failed."""
+    ours = type(error).__module__.partition(".")[0] in ("distributed", "tornado")
+    return ours or isinstance(error, CancelledError | TimeoutError | ConnectionError)
 
 
 def _backend(joblib: Any, workers: int, dask: str | None) -> AbstractContextManager[Any]:
     if dask is not None:
         return joblib.parallel_config("dask")
-    if workers == 1:
-        return joblib.parallel_config("sequential", n_jobs=1)
     # One thread per worker: the kernels are single-threaded, and BLAS must not take the other workers' cores.
-    return joblib.parallel_config("loky", n_jobs=workers, inner_max_num_threads=1)
+    return joblib.parallel_config(
+        "loky", n_jobs=workers, inner_max_num_threads=1, initializer=_end_with_parent, initargs=(os.getpid(),)
+    )
+
+
+@contextmanager
+def _born_deaf() -> Iterator[None]:
+    """Processes that start within it never hear the signals that end a run: those reach every process of a terminal, and it is this
+    process that acts on them, from the first moment on."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_with_parent(parent: int) -> None:
+    """In a worker: end when the process that started it is gone, whatever ended that. The kernels let other threads run."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def dismiss_workers() -> None:
+    """End this machine's workers at once: they are not asked any more, and an interrupted process must not wait for them at its end."""
+    from joblib.externals.loky import get_reusable_executor
+
+    get_reusable_executor(reuse=True).shutdown(wait=False, kill_workers=True)
 
 
 def _guarded(function: Callable[[J], T], job: J) -> T:
-    """Ctrl-C reaches every process of the terminal: the parent acts on it, a worker must not die midway."""
+    """Ctrl-C reaches every process of the terminal: the parent acts on it, a worker (of dask, say) must not die midway."""
     in_worker = multiprocessing.parent_process() is not None
     if in_worker and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     return function(job)
+
+
+def beside(work: Callable[[], T]) -> T:
+    """`work()` in a thread of its own, so that Ctrl-C ends the wait for it even while a kernel runs; then the work is given up."""
+    result: list[T] = []
+    failure: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            result.append(work())
+        except BaseException as error:
+            failure.append(error)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        while thread.is_alive():
+            thread.join(0.2)
+    except BaseException:
+        # raised in the thread as soon as its kernel returns: nothing is written after the run has ended
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(thread.ident or 0), ctypes.py_object(SystemExit)
+        )
+        raise
+    if failure:
+        raise failure[0]
+    return result[0]

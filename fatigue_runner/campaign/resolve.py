@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fatigue_runner.campaign.bounds import check_memory, check_steps, realisations
 from fatigue_runner.campaign.integration import Integration, file_hash, load_corrector
 from fatigue_runner.campaign.spec import Campaign, IntegratorSection
 from fatigue_runner.errors import InputError
@@ -82,7 +83,9 @@ def resolve(campaign: Campaign, source: Source) -> Resolved:
     turbine = _operated(_load_turbine(turbine_source, source), campaign, source)
     pitch = _pitch(campaign, turbine, source)
     integrations = _integrations(campaign, source)
-    winds = _winds(campaign, turbine, pitch, source)
+    check_steps(campaign, integrations, source)
+    check_memory(campaign, source)
+    winds = _winds(campaign, turbine, pitch, len(integrations), source)
     walls = _walls(campaign, turbine, source)
     sections = _sections(campaign, turbine, source)
     return Resolved(campaign, source, turbine, turbine_source, pitch, integrations, winds, walls, sections)
@@ -187,14 +190,15 @@ def _corrector(section: IntegratorSection, source: Source, path: tuple[str | int
 
 
 def _winds(
-    campaign: Campaign, turbine: Turbine, pitch: float | PitchSeries, source: Source
+    campaign: Campaign, turbine: Turbine, pitch: float | PitchSeries, integrations: int, source: Source
 ) -> list[ResolvedWind]:
     """Every wind with its start; those of one mean wind share it."""
     from fatigue_runner.turbine.envelope import check_wind
 
     place = Place(source, ("wind",))
     winds, starts = [], _Starts(campaign, turbine, pitch)
-    for named in campaign.wind.winds(Site(turbine.rotor, campaign.duration, place)):
+    site = Site(turbine.rotor, campaign.duration, place)
+    for named in realisations(campaign, site, integrations, source):
         where = place.where(*named.path)
         blowing = _blowing(named, turbine.rotor, campaign.duration, where)
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import shutil
 import time
@@ -14,12 +15,12 @@ from fatigue_runner.campaign.about import about, operating_curve, resolved_yaml,
 from fatigue_runner.campaign.block import Job, Setup, run_block
 from fatigue_runner.campaign.pieces import followed
 from fatigue_runner.campaign.plan import Plan, make_plan
-from fatigue_runner.campaign.pool import WorkerEndedError, connect, run_jobs
+from fatigue_runner.campaign.pool import WorkerEndedError, beside, connect, dismiss_workers, run_jobs
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.campaign.trust import reference_facts
 from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.interruption import end_if_asked, exit_code_of
 from fatigue_runner.results.beyond import beyond
-from fatigue_runner.results.columns import table
 from fatigue_runner.results.table import Results
 from fatigue_runner.turbine.rated import rated_rotor_speed
 
@@ -35,9 +36,11 @@ LARGE = 1e9  # bytes of logs that are told before a run
 
 
 class CampaignInterrupted(FatigueRunnerError):
-    """Ctrl-C: what is finished is kept."""
+    """Ctrl-C, SIGTERM or SIGHUP: what is finished is kept. `exit_code` is 130, 143 or 129."""
 
-    exit_code = 130
+    def __init__(self, message: str, exit_code: int = 130) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code
 
 
 def run_campaign(
@@ -58,6 +61,40 @@ def run_campaign(
     each job and the number of workers; the cases run inside the context that it returns. Raises InputError before
     anything is written where the campaign or the folder is wrong, and CampaignInterrupted on Ctrl-C.
     """
+    folder = Path(out) if out is not None else None
+    try:
+        return _run_campaign(campaign, folder, workers, fresh, dask, console, watch)
+    except OSError as error:
+        raise FatigueRunnerError(_system_error(error, folder)) from error
+
+
+def _system_error(error: OSError, folder: Path | None) -> str:
+    """What the system says, where, and what helps."""
+    where = error.filename or folder or "the run folder"
+    helps = {
+        errno.ENOSPC: "free some space on that disk",
+        errno.EDQUOT: "free some of your quota on that disk",
+        errno.EROFS: "make it writable again, or choose another --out",
+        errno.EACCES: "make it writable again, or choose another --out",
+        errno.ENOENT: "the folder was removed while the campaign ran",
+        errno.EMFILE: "allow more open files (`ulimit -n`), or use fewer --workers",
+    }
+    way_out = helps.get(error.errno or 0, "see to it")
+    return (
+        f"{where}: {error.strerror or error}; {way_out}: what is finished is kept where it is still there, and the same command "
+        "runs the rest"
+    )
+
+
+def _run_campaign(
+    campaign: str | Path | Mapping[str, Any],
+    out: Path | None,
+    workers: int | None,
+    fresh: bool,
+    dask: str | None,
+    console: Console | None,
+    watch: Watch | None,
+) -> Results:
     from fatigue_runner.campaign.progress import Progress
 
     started = time.perf_counter()
@@ -65,8 +102,8 @@ def run_campaign(
         plan = make_plan(campaign, progress.say)
         for sentence in plan.notes:
             progress.note(sentence)
-        folder = Path(out) if out is not None else Path("runs") / plan.campaign.name
-        store = Store(folder, plan.identity, fresh)
+        folder = out if out is not None else Path("runs") / plan.campaign.name
+        store = Store(folder, plan.identity, fresh, [column.name for column in plan.columns])
         if dask is not None:
             connect(dask)
         simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress, watch)
@@ -78,7 +115,12 @@ def run_campaign(
             results.life = life_of(results.rows, plan.campaign.lifetime)
             results.life.write(results.out)
         progress.say("writing the report")
-        _write_report(results)
+        end_if_asked()
+        try:
+            _write_report(results)
+        except KeyboardInterrupt:
+            dismiss_workers()
+            raise
     results.wall_time = time.perf_counter() - started
     return results
 
@@ -98,7 +140,7 @@ def _simulate(
 ) -> int:
     """Run the cases that are not finished; returns how many there were."""
     progress.say("checking the reference")
-    facts = about(plan.resolved) | reference_facts(plan, store.earlier)
+    facts = about(plan.resolved) | beside(lambda: reference_facts(plan, store.earlier))
     text = resolved_yaml(plan.resolved)
     setup = Setup(
         plan.campaign,
@@ -124,28 +166,40 @@ def _simulate(
         pending = sum(len(job.cases) for job in jobs)
         progress.begin(len(plan.cases), len(plan.cases) - pending)
         if jobs:
-            _warm_up(plan, jobs)
+            beside(lambda: _warm_up(plan, jobs))
         progress.say("running")
         ids = [[case.id for case in job.cases] for job in jobs]
         for sentence in _before(plan, store, pending):
             progress.note(sentence)
         watched = watch(store.out, len(plan.cases), ids, workers) if watch else nullcontext()
         with watched, followed(lambda: progress.advance(store.take_in())):
-            for records in run_jobs(run_block, jobs, workers, dask):
-                progress.advance(store.add(records))
+            try:
+                _run(jobs, workers, dask, store, progress)
+            except WorkerEndedError as error:
+                progress.note(f"{error}; what it was doing is tried once more")
+                progress.advance(store.take_in())
+                _run(plan.jobs(store, setup, workers), workers, dask, store, progress)
         return pending
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
+        dismiss_workers()
         store.take_in()
         raise CampaignInterrupted(
-            f"interrupted: {_finished(plan, store)} are finished; the same command runs the rest"
+            f"interrupted: {_finished(plan, store)} are finished; the same command runs the rest",
+            exit_code_of(interrupt),
         ) from None
     except WorkerEndedError as error:
         raise FatigueRunnerError(
-            f"{error}; {_finished(plan, store)} are finished and kept, the same command runs the rest (with fewer --workers, which "
-            "takes less memory)"
+            f"{error}, and so did the one that tried it again; {_finished(plan, store)} are finished and kept, the same command runs the "
+            "rest (with fewer --workers, which takes less memory)"
         ) from None
     finally:
         store.close()
+
+
+def _run(jobs: Sequence[Job], workers: int, dask: str | None, store: Store, progress: Any) -> None:
+    for records in run_jobs(run_block, jobs, workers, dask):
+        progress.advance(store.add(records))
+        end_if_asked()
 
 
 def _warm_up(plan: Plan, jobs: Sequence[Job]) -> None:
@@ -181,6 +235,10 @@ def _before(plan: Plan, store: Store, pending: int) -> list[str]:
             f"the logs of {pending} cases will take about {size / 1e9:.2g} GB; {free / 1e9:.3g} GB are free{little} (`log:` in the "
             "campaign can leave out topics and channels)"
         )
+    if store.damaged:
+        said.append(
+            f"{store.damaged} records in {store.out / 'cases.jsonl'} are damaged: these cases run again, or are read from their logs"
+        )
     strangers = store.strangers(plan.cases)
     if strangers:
         freed = sum(path.stat().st_size for path in strangers)
@@ -197,18 +255,11 @@ def _finished(plan: Plan, store: Store) -> str:
 
 
 def _collect(plan: Plan, store: Store, simulated: int) -> Results:
-    fatigue = plan.campaign.fatigue
     rows = [store.records[case.id]["row"] for case in plan.cases]
-    meanings = table(
-        plan.campaign.counted,
-        fatigue.wohler_exponents,
-        plan.resolved.turbine.layout.states,
-        fatigue.angles,
-    )
     return Results(
         out=store.out,
-        columns=[column.name for column in meanings],
-        meanings=meanings,
+        columns=[column.name for column in plan.columns],
+        meanings=plan.columns,
         rows=rows,
         notes=beyond(rows, rated_rotor_speed(plan.resolved.turbine)),
         simulated=simulated,

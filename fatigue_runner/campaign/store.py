@@ -7,7 +7,7 @@
     logs/           <case id>.mcap
     results.csv, columns.csv, results.parquet, lifetime.csv, damage.csv, report.html
 
-A finished case is kept when its hash is unchanged and its log is complete.
+A finished case is kept when its hash is unchanged, its record is whole (each has a checksum) and its log is still what was written.
 """
 
 from __future__ import annotations
@@ -16,29 +16,38 @@ import errno
 import json
 import os
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
 from fatigue_runner.campaign.cases import Case
-from fatigue_runner.campaign.pieces import Pieces
+from fatigue_runner.campaign.pieces import FOLDER, Pieces
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.naming import LONGEST_NAME
+from fatigue_runner.results.records import to_line, whole_records
 
 # What all cases of a folder have in common. Where it differs, no finished case could be kept.
 _IDENTITY = ("name", "code", "turbine_hash", "duration", "output_rate", "initial", "pitch")
+_RESULTS = ("results.csv", "columns.csv", "results.parquet", "lifetime.csv", "damage.csv", "report.html")
+_OWN = {"campaign.yaml", "run.json", "cases.jsonl", FOLDER, "logs", *_RESULTS}
 
 
 class Store:
     """A run folder. Making one checks and reads, and writes nothing; `open` creates, locks and writes.
 
-    identity: the values of `_IDENTITY`. Raises InputError where the folder belongs to another campaign, or
-    holds files and is no run folder.
+    identity: the values of `_IDENTITY`; columns: what a finished case's row must have. Raises InputError where the folder belongs to
+    another campaign, or holds files and is no run folder.
     """
 
-    def __init__(self, out: Path, identity: dict[str, Any], fresh: bool = False) -> None:
+    def __init__(
+        self, out: Path, identity: dict[str, Any], fresh: bool = False, columns: Collection[str] = ()
+    ) -> None:
         self.out = out
+        self._columns = set(columns)
+        self.damaged = 0  # lines of cases.jsonl that are not as they were written
+        self._checked: dict[str, tuple[int, int]] = {}  # size and time of logs whose content was checked
         self.identity = {key: identity[key] for key in _IDENTITY}
         self._fresh = fresh
         self._journal: IO[bytes] | None = None
@@ -55,6 +64,8 @@ class Store:
         """The record of a case that need not run again; None where it must."""
         record = self.records.get(case.id)
         if record is None or record["hash"] != case.hash or record["row"]["status"] == "failed":
+            return None
+        if not self._columns <= record["row"].keys():
             return None
         return record if not logged or self._log_complete(record) else None
 
@@ -75,6 +86,17 @@ class Store:
                 f"{self.out}: cannot be written ({error.strerror}); choose another --out"
             ) from None
         _lock(self._journal, self.out)
+        try:
+            self._take_over(run, campaign_text)
+        except BaseException:
+            self._journal.close()
+            self._journal = None
+            raise
+
+    def _take_over(self, run: dict[str, Any], campaign_text: str) -> None:
+        assert self._journal is not None
+        self._check_folder()  # a run that held the lock until now may have been another campaign's
+        self.records = {} if self._fresh else self._read_records()
         if self._fresh:
             self._clear()
             self._pieces.clear()
@@ -101,7 +123,7 @@ class Store:
             new = [r for r in come() if self.records.get(r["row"]["case_id"]) != r]
             for record in new:
                 self.records[record["row"]["case_id"]] = record
-                journal.write(json.dumps(record, allow_nan=False).encode() + b"\n")
+                journal.write(to_line(record))
             if new:
                 journal.flush()
                 os.fsync(journal.fileno())
@@ -110,14 +132,19 @@ class Store:
     def strangers(self, cases: Iterable[Case]) -> list[Path]:
         """Logs in the folder that are of none of the cases: of winds and integrators that have left the campaign."""
         known = {self.log_path(case.id).name for case in cases}
-        return [path for path in sorted((self.out / "logs").glob("*.mcap")) if path.name not in known]
+        logs = (self.out / "logs").glob("*.mcap*")
+        return [path for path in sorted(logs) if path.name.removesuffix(".part") not in known]
 
     def close(self) -> None:
         """Release the folder."""
-        if self._journal is not None:
+        if self._journal is None:
+            return
+        try:
             self.take_in()
             self._pieces.clear()
-            self._journal.close()
+        finally:
+            with suppress(OSError):  # what cannot be written has been told already
+                self._journal.close()
             self._journal = None
 
     def _check_folder(self) -> None:
@@ -128,44 +155,58 @@ class Store:
             raise InputError(f"{self.out} is a file; give --out a folder")
         try:
             theirs = json.loads((self.out / "run.json").read_text())
+            if not isinstance(theirs, dict):
+                raise ValueError("no mapping")
         except FileNotFoundError:
-            if any(self.out.iterdir()):
+            # a run that was killed early leaves its own files without run.json; each record says itself what it is of
+            names = {path.name.removesuffix(".part") for path in self.out.iterdir()}
+            early = names <= {"logs"} and not any((self.out / "logs").glob("*"))
+            if not early and not ("cases.jsonl" in names and names <= _OWN):
                 raise InputError(
                     f"{self.out} holds files but no run; give --out a new or empty folder"
                 ) from None
             return
-        except (OSError, ValueError):
-            raise InputError(f"{self.out}/run.json cannot be read; give --out a new folder") from None
+        except OSError as error:
+            raise InputError(
+                f"{self.out / 'run.json'} cannot be read ({error.strerror}); choose another --out"
+            ) from None
+        except ValueError:
+            raise InputError(
+                f"{self.out / 'run.json'} is damaged; delete it, and the same command goes on with the finished cases of the folder"
+            ) from None
         for key, mine in self.identity.items():
             if theirs.get(key) != mine and (key == "name" or not self._fresh):
                 raise InputError(f"{self.out} {_difference(key, theirs.get(key), mine)}")
         self.earlier = {} if self._fresh else theirs
 
     def _read_records(self) -> dict[str, dict[str, Any]]:
-        """The last record of every case; a line that a crash cut off is as if it were never written."""
-        records = {}
+        """The last record of every case; one that is damaged or was cut off is as if it were never written."""
         try:
-            lines = (self.out / "cases.jsonl").read_bytes().split(b"\n")
+            found, self.damaged = whole_records((self.out / "cases.jsonl").read_bytes())
         except FileNotFoundError:
             return {}
-        for line in lines:
-            try:
-                record = json.loads(line)
-                records[record["row"]["case_id"]] = record
-            except (ValueError, KeyError, TypeError):
-                continue
-        return records
+        return {record["row"]["case_id"]: record for record in found}
 
     def _ends_with_a_line(self) -> bool:
         content = (self.out / "cases.jsonl").read_bytes()
         return not content or content.endswith(b"\n")
 
     def _log_complete(self, record: dict[str, Any]) -> bool:
-        from fatigue_runner.logbook import is_complete
+        """Whether the log is, to the last bit, what was written."""
+        from fatigue_runner.logbook import checksum
 
-        path = self.log_path(record["row"]["case_id"])
-        size = path.stat().st_size if path.is_file() else 0
-        return size > 0 and size == record["log_bytes"] and is_complete(path)
+        case_id = record["row"]["case_id"]
+        path = self.log_path(case_id)
+        try:
+            found = path.stat()
+            if not record["log_bytes"] or found.st_size != record["log_bytes"]:
+                return False
+            seen = found.st_size, found.st_mtime_ns
+            if self._checked.get(case_id) != seen and checksum(path) == record["log_checksum"]:
+                self._checked[case_id] = seen
+            return self._checked.get(case_id) == seen
+        except OSError:
+            return False
 
     def _clear(self) -> None:
         """Remove what earlier runs of this campaign left: `--fresh` asked for it."""
@@ -173,14 +214,7 @@ class Store:
         for case_id in self._read_records():
             self.log_path(case_id).unlink(missing_ok=True)
         self._journal.truncate(0)
-        for name in (
-            "results.csv",
-            "columns.csv",
-            "results.parquet",
-            "lifetime.csv",
-            "damage.csv",
-            "report.html",
-        ):
+        for name in _RESULTS:
             (self.out / name).unlink(missing_ok=True)
 
 

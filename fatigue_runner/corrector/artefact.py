@@ -17,6 +17,7 @@ from fatigue_runner.corrector.binding import Binding
 from fatigue_runner.corrector.corrector import Corrector
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.guard import Guard
+from fatigue_runner.corrector.header import check_header
 from fatigue_runner.corrector.maps import MAPS, map_class
 from fatigue_runner.encoded import refuse_pointer
 from fatigue_runner.layout import FAMILIES, T2B1I1CG, Channel, FirstOrder, Layout, family_of
@@ -109,9 +110,23 @@ def load(path: Path | str) -> Corrector:
             f"{path} is no corrector of this program (format {metadata.get('format')!r}, expected {FORMAT!r})"
         )
     try:
-        return _corrector(json.loads(metadata["header"]), tensors)
-    except (KeyError, TypeError, json.JSONDecodeError) as error:
-        raise CorrectorError(f"{path}: the header is incomplete ({error}); train it anew") from None
+        header = json.loads(metadata["header"])
+    except (KeyError, ValueError, RecursionError) as error:
+        raise CorrectorError(f"{path}: the header cannot be read ({error}); train it anew") from None
+    try:
+        check_header(header)
+        _refuse_no_numbers(tensors)
+        return _corrector(header, tensors)
+    except CorrectorError as error:
+        raise CorrectorError(f"{path}: {error}; copy or train it anew") from None
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise CorrectorError(f"{path}: header and arrays do not fit ({error}); train it anew") from None
+
+
+def _refuse_no_numbers(tensors: dict[str, Any]) -> None:
+    for name, values in tensors.items():
+        if not np.isfinite(values).all():
+            raise CorrectorError(f"the array {name!r} holds a value that is no number")
 
 
 def _corrector(header: dict[str, Any], tensors: dict[str, Any]) -> Corrector:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,8 @@ from fatigue_runner.errors import InputError
 # Aliases (`&a`, `*a`) can nest into each other and grow without bound from a few bytes of text.
 MAX_VALUES = 100_000
 MAX_DEPTH = 32
+_PLAIN = (bool, int, float, str, datetime.date, type(None))
+_TAG = re.compile(r"(?:^|[\s\[{,:-])(![^\s,\]}]*)")
 
 
 @dataclass(frozen=True)
@@ -128,10 +131,13 @@ class Source:
         if isinstance(node, os.PathLike):
             return os.fspath(node)
         if hasattr(node, "tolist"):  # numbers and arrays of a mapping that was computed
-            return node.tolist()
+            return self._plain(node.tolist(), path)
         for plain in (bool, int, float, str):  # ruamel's scalars are subclasses that carry their formatting
             if isinstance(node, plain):
                 return plain(node)
+        if self.text and not isinstance(node, _PLAIN):
+            tag = getattr(getattr(node, "tag", None), "value", None) or type(node).__name__
+            raise InputError(f"{self.where(path)}: the tag {tag} means nothing here; remove it")
         return node
 
     def _child(self, node: Any, key: Any, name: str | int, value: Any, path: tuple[str | int, ...]) -> Any:
@@ -212,19 +218,47 @@ def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
+    _refuse_endless(text, path, what)
     try:
         data = YAML(typ="rt").load(_with_spaces(text, path))
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"{path}:{mark.line + 1}" if mark else str(path)
-        raise InputError(f"{place}: {_yaml_problem(error)}") from None
+        tagged = mark is not None and _TAG.search(text.split("\n")[mark.line])
+        raise InputError(
+            f"{place}: {_yaml_problem(error)}{'; remove the tag (`!...`)' if tagged else ''}"
+        ) from None
     except YAMLError as error:  # e.g. control characters: no mark
         raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
+    except (ValueError, TypeError, AttributeError, KeyError) as error:  # of a value whose tag does not fit it
+        raise InputError(
+            f"{_first_tag(text, path)}: a tag (`!!...`) does not fit its value, {' '.join(str(error).split())}; remove the tag"
+        ) from None
     except RecursionError:
         raise InputError(f"{path}: not a {what}: its brackets nest too deeply") from None
     if not isinstance(data, Mapping):
         raise InputError(f"{path}:1: a {what} is a mapping of keys ({keys})")
     return Source(str(path), data, text, path.absolute().parent, what)
+
+
+def _refuse_endless(text: str, path: Path, what: str) -> None:
+    """Raises InputError, at the longest line, for more values than a person writes: the parser would take minutes for them."""
+    count = text.count(",") + text.count("\n")
+    if count > MAX_VALUES:
+        lines = text.split("\n")
+        longest = max(range(len(lines)), key=lambda i: len(lines[i]))
+        raise InputError(
+            f"{path}:{longest + 1}: about {count:,} values, and a {what} holds {MAX_VALUES:,} at most; a sweep can be written as "
+            "{start, stop, count}, long series belong in files of their own"
+        )
+
+
+def _first_tag(text: str, path: Path) -> str:
+    """The place of the first tag in a text that could not be read."""
+    for number, line in enumerate(text.split("\n"), start=1):
+        if _TAG.search(line.split("#")[0]):
+            return f"{path}:{number}"
+    return str(path)
 
 
 def _with_spaces(text: str, path: Path) -> str:

@@ -10,12 +10,12 @@ the names of channels.
 from fatigue_runner.logbook.check import Check, check
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.export import export
-from fatigue_runner.logbook.metadata import is_complete, read_metadata
+from fatigue_runner.logbook.metadata import checksum, is_complete, read_metadata
 from fatigue_runner.logbook.reader import Log, read_log
 from fatigue_runner.logbook.recovery import Recovery, recover
 from fatigue_runner.logbook.summary import LogSummary, summarise
 from fatigue_runner.logbook.tail import LogTail
-from fatigue_runner.logbook.writer import LogWriter, write_log
+from fatigue_runner.logbook.writer import LogWriter, log_of, write_log
 
 __all__ = [
     "Check",
@@ -26,8 +26,10 @@ __all__ = [
     "LogWriter",
     "Recovery",
     "check",
+    "checksum",
     "export",
     "is_complete",
+    "log_of",
     "read_log",
     "read_metadata",
     "recover",

@@ -107,6 +107,15 @@ def read_metadata(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     return contents.metadata
 
 
+def checksum(path: str | os.PathLike[str]) -> int:
+    """CRC-32 of the whole file, as its writer had it in `LogWriter.checksum`; OSError where it cannot be read."""
+    crc = 0
+    with open(path, "rb") as stream:
+        while data := stream.read(1 << 20):
+            crc = zlib.crc32(data, crc)
+    return crc
+
+
 def is_complete(path: str | os.PathLike[str]) -> bool:
     """Whether the file is a whole log with its result and all of its rows; False even for no file.
 

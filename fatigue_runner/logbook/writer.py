@@ -70,6 +70,7 @@ class LogWriter:
         self.path = Path(path)
         self.part = part_of(self.path)
         self.result: dict[str, Any] = {}
+        self.size = self.checksum = 0  # of the finished file: bytes, CRC-32
         self.rows = 0
         self._totals = {"steps": 0, "evaluations": 0, "clamped_lookups": 0, "wall_time": 0.0}
         self._diverged_at: float | None = None
@@ -236,6 +237,7 @@ class LogWriter:
             self._close_chunk()
             self._container.metadata("result", self._full_result())
             self._container.finish()
+            self.size, self.checksum = self._container.offset, self._container.crc
             publish(self._file, self.part, self.path, self._sync)
 
     def abort(self) -> None:
@@ -257,7 +259,12 @@ class LogWriter:
             self.abort()
 
 
-def write_log(
+def write_log(path: str | os.PathLike[str], trajectory: Trajectory, *args: Any, **options: Any) -> Path:
+    """Write a whole trajectory as one log and return its path; the arguments are those of `log_of`."""
+    return log_of(path, trajectory, *args, **options).path
+
+
+def log_of(
     path: str | os.PathLike[str],
     trajectory: Trajectory,
     run: Mapping[str, Any] | None = None,
@@ -270,8 +277,8 @@ def write_log(
     topics: Iterable[str] | None = None,
     channels: Iterable[str] | None = None,
     sync: bool = True,
-) -> Path:
-    """Write a whole trajectory as one log and return its path.
+) -> LogWriter:
+    """Write a whole trajectory as one log and return what wrote it, which knows the file's `path`, `size` and `checksum`.
 
     run, result: metadata at the beginning and the end, values as text (the trajectory's counters are added
     to `result`). reference_error: (n-1,) error against the reference where known; clamped_lookups: (n-1,)
@@ -297,4 +304,4 @@ def write_log(
         with suppress(OSError):
             writer.part.unlink()
         raise
-    return writer.path
+    return writer

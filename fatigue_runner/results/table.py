@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -18,6 +17,7 @@ from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.results.columns import NEEDED, Column, kind_of, units_csv
 from fatigue_runner.results.frames import to_arrow, to_pandas
+from fatigue_runner.results.records import whole_records
 
 if TYPE_CHECKING:
     from fatigue_runner.results.lifetime import Life
@@ -125,14 +125,8 @@ def _with_point(cell: Any) -> Any:
 
 def _finished_cases(journal: Path) -> list[dict[str, Any]]:
     """The last row of every case of a journal; a line that a crash cut off is as if it were never written."""
-    found: dict[str, dict[str, Any]] = {}
-    for line in journal.read_bytes().split(b"\n"):
-        try:
-            row = json.loads(line)["row"]
-            found[row["case_id"]] = row
-        except (ValueError, KeyError, TypeError):
-            continue
-    return list(found.values())
+    found, _ = whole_records(journal.read_bytes())
+    return list({record["row"]["case_id"]: record["row"] for record in found}.values())
 
 
 def read_results(folder: Path) -> list[dict[str, Any]]:

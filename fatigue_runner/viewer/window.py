@@ -123,6 +123,10 @@ def viewer(*arguments: str | Path) -> Iterator[subprocess.Popen[bytes]]:
         end(process)
 
 
+# The viewer reports its use to its makers unless it was told not to in a file of the user's, or runs in continuous integration.
+SILENT = {"CI": "1"}
+
+
 def start_viewer(*arguments: str | Path, own_session: bool = True) -> subprocess.Popen[bytes]:
     """Start the viewer's program itself: the `rerun` script is a wrapper, and stopping that leaves the viewer alone.
 
@@ -134,6 +138,7 @@ def start_viewer(*arguments: str | Path, own_session: bool = True) -> subprocess
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
+        env={**os.environ, **SILENT},
         start_new_session=own_session,
     )
 

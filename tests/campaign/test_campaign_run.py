@@ -303,14 +303,14 @@ def test_an_integrator_that_raises_fails_alone_and_is_tried_again(world, campaig
 def test_a_log_that_cannot_be_written_fails_its_case_only(world, campaign, out, monkeypatch):
     import fatigue_runner.logbook as logbook
 
-    write = logbook.write_log
+    write = logbook.log_of
 
     def full_disk(path, *args, **kwargs):
         if path.stem == "v08.00_rk4_100ms":
             raise logbook.LogError("the disk is full; free space or choose another folder")
         return write(path, *args, **kwargs)
 
-    monkeypatch.setattr(logbook, "write_log", full_disk)
+    monkeypatch.setattr(logbook, "log_of", full_disk)
     results = run_campaign(campaign, out)
     assert [row["case_id"] for row in results.lost] == ["v08.00_rk4_100ms"]
     assert "the disk is full" in results.lost[0]["error_message"]
@@ -548,30 +548,34 @@ def test_a_case_name_that_no_file_can_have_is_refused(world, tmp_path, monkeypat
     assert not (tmp_path / "run").exists()
 
 
-def test_a_worker_that_is_ended_from_outside_is_told_and_the_same_command_goes_on(
-    world, tmp_path, monkeypatch
-):
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
+@pytest.mark.parametrize("deaths", [1, 2])
+def test_a_worker_that_is_ended_from_outside_is_replaced_once_then_told(world, tmp_path, monkeypatch, deaths):
     from fatigue_runner.campaign import run as module
+    from fatigue_runner.campaign.pool import WorkerEndedError
 
     campaign, folder = write_campaign(tmp_path), tmp_path / "run"
-    real = module.run_block
+    real, asked = module.run_jobs, []
 
-    def killed(job):
-        if len(world.calls) > 3:
-            raise TerminatedWorkerError("SIGKILL")
-        return real(job)
+    def killed(function, jobs, *others):
+        asked.append(sum(len(job.cases) for job in jobs))
+        if len(asked) > deaths:
+            yield from real(function, jobs, *others)
+        else:
+            yield function(jobs[0])
+            raise WorkerEndedError("a worker is gone")
 
     monkeypatch.setattr("fatigue_runner.campaign.plan.BLOCK_SIZE", 1)
-    monkeypatch.setattr(module, "run_block", killed)
-    with pytest.raises(
-        FatigueRunnerError, match=r"want of memory; 4 of 12 cases are finished and kept.*--workers"
-    ) as told:
-        run_campaign(campaign, folder)
-    assert told.value.exit_code == 1
-    monkeypatch.setattr(module, "run_block", real)
-    assert run_campaign(campaign, folder).kept == 4
+    monkeypatch.setattr(module, "run_jobs", killed)
+    if deaths == 1:
+        assert len(run_campaign(campaign, folder)) == 12
+    else:
+        with pytest.raises(
+            FatigueRunnerError, match=r"gone, and so.*8 of 12 cases are finished.*--workers"
+        ) as told:
+            run_campaign(campaign, folder)
+        assert told.value.exit_code == 1
+        assert run_campaign(campaign, folder).kept == 8
+    assert asked[:2] == [12, 8], "what was finished is not asked for again"
 
 
 @pytest.mark.parametrize("how", ["mark", "semicolons", "tabs in UTF-16"])

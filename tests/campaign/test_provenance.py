@@ -183,5 +183,6 @@ def test_what_a_running_case_loads_is_known_to_decide_or_to_keep_the_run_folder(
         "results/beyond.py",
         "results/relevance.py",
         "results/cells.py",
-    )  # sentences about figures, and a bound of the reference's error
+        "interruption.py",
+    )  # sentences about figures, a bound of the reference's error, and what ends a run
     assert {name for name in beside if not name.startswith(("campaign/", "report/", *telling))} == set()

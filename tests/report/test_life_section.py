@@ -12,6 +12,7 @@ from fatigue_runner.report.blocks import Figure, Table, Warnings
 from fatigue_runner.report.page import render
 from fatigue_runner.report.rundata import load_run
 from fatigue_runner.report.sections import definitions, life, life_spectra
+from fatigue_runner.results.records import to_line
 
 LIFE = {"climate": "II", "bins": {"edges": [4.5, 5.5, 6.5, 7.5, 8.5, 9.5, 10.5]}}
 DAMAGE = {"damage": [{"place": "tower_base", "curve": "dnv-d-air"}]}
@@ -71,8 +72,8 @@ def test_a_run_that_has_not_ended_says_so_and_shows_what_there_is(tmp_path):
     rows = example_rows(diverging=False)
     write_run(tmp_path, rows, CAMPAIGN)
     (tmp_path / "results.csv").unlink()
-    lines = [json.dumps({"row": {k: None if v == "" else v for k, v in row.items()}}) for row in rows[:25]]
-    (tmp_path / "cases.jsonl").write_text("\n".join([*lines, '{"row": {"case_id": "cut of']))
+    lines = [to_line({"row": {k: None if v == "" else v for k, v in row.items()}}) for row in rows[:25]]
+    (tmp_path / "cases.jsonl").write_bytes(b"".join([*lines, to_line({"row": {"case_id": "cut off"}})[:40]]))
     (tmp_path / "run.json").write_text(json.dumps({"campaign": CAMPAIGN, "cases": len(rows)}))
     run = load_run(tmp_path)
     page = render(run)
