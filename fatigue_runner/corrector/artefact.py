@@ -115,18 +115,11 @@ def load(path: Path | str) -> Corrector:
         raise CorrectorError(f"{path}: the header cannot be read ({error}); train it anew") from None
     try:
         check_header(header)
-        _refuse_no_numbers(tensors)
         return _corrector(header, tensors)
     except CorrectorError as error:
         raise CorrectorError(f"{path}: {error}; copy or train it anew") from None
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise CorrectorError(f"{path}: header and arrays do not fit ({error}); train it anew") from None
-
-
-def _refuse_no_numbers(tensors: dict[str, Any]) -> None:
-    for name, values in tensors.items():
-        if not np.isfinite(values).all():
-            raise CorrectorError(f"the array {name!r} holds a value that is no number")
 
 
 def _corrector(header: dict[str, Any], tensors: dict[str, Any]) -> Corrector:

@@ -34,7 +34,7 @@ class _Guard(_Checked):
 
 class _Header(_Checked):
     name: Name
-    family: Name
+    family: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+-]*$", max_length=100)]
     turbine: Word
     turbine_hash: Word
     method: Word

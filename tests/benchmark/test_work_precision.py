@@ -271,7 +271,7 @@ def test_a_folder_that_cannot_be_written_is_said_in_one_sentence(monkeypatch, tm
     monkeypatch.setattr(run, "measure", lambda *arguments, **named: timed)
     (tmp_path / "file").write_text("")
     done = CliRunner().invoke(app, ["work-precision", "--out", str(tmp_path / "file")])
-    assert isinstance(done.exception, InputError) and "give --out another folder" in str(done.exception)
+    assert isinstance(done.exception, InputError) and "give --out a folder" in str(done.exception)
 
 
 def test_a_file_that_is_no_earlier_run_is_refused(tmp_path):

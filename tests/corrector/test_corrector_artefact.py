@@ -71,10 +71,10 @@ def rewritten(path, change):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda h, t: h.pop("turbine_hash"), "header is incomplete"),
-        (lambda h, t: h.pop("guard"), "header is incomplete"),
-        (lambda h, t: h["guard"].pop("atol"), "header is incomplete"),
-        (lambda h, t: h.update(layers=1), "header is incomplete"),
+        (lambda h, t: h.pop("turbine_hash"), "the header: key 'turbine_hash' is missing"),
+        (lambda h, t: h.pop("guard"), "the header: key 'guard' is missing"),
+        (lambda h, t: h["guard"].pop("atol"), "key 'atol' is missing in guard"),
+        (lambda h, t: h.update(layers=1), "header and arrays do not fit"),
         (lambda h, t: t["linear"].__setitem__((3, 4), np.nan), "a weight is not a finite number"),
         (lambda h, t: t["linear"].__setitem__((3, 4), np.inf), "a weight is not a finite number"),
         (lambda h, t: t.update(linear=t["linear"][:, :-1].copy()), "do not fit heun's features"),

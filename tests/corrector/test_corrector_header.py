@@ -80,7 +80,7 @@ def test_an_array_with_no_number_is_refused(tmp_path, parts):
     name, values = next(iter(parts[0].items()))
     values = values.copy()
     values.flat[0] = float("nan")
-    with pytest.raises(CorrectorError, match=rf"{name}.*no number"):
+    with pytest.raises(CorrectorError, match="a weight is not a finite number"):
         load(written(tmp_path, parts, parts[2], **{name: values}))
 
 
