@@ -27,7 +27,7 @@ def connected(trace: str) -> list[str]:
 def traced(tmp_path, command, seconds=None) -> list[str]:
     trace = tmp_path / "trace"
     process = subprocess.Popen(
-        ["strace", "-f", "-e", "trace=connect,sendto,sendmsg,sendmmsg", "-o", str(trace), *command],
+        ["strace", "-f", "--seccomp-bpf", "-e", "trace=connect,sendto,sendmsg,sendmmsg", "-o", str(trace), *command],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env={k: v for k, v in os.environ.items() if k != "CI"},
         start_new_session=True,
     )  # fmt: skip
