@@ -165,3 +165,8 @@ def test_the_logs_that_help_texts_name_are_those_of_the_quickstart():
         text = (ROOT / "fatigue_runner" / room / "commands.py").read_text(encoding="utf-8")
         named = re.findall(r"runs/quickstart/logs/(\S+)\.mcap", text)
         assert named and set(named) <= logs
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_no_page_holds_two_versions_of_a_paragraph(page):
+    assert not re.search(r"^(<{7} |>{7} )", PAGES[page].read_text(encoding="utf-8"), re.M)
