@@ -18,7 +18,9 @@ def to_line(record: dict[str, Any]) -> bytes:
 
 
 def from_line(line: bytes) -> dict[str, Any] | None:
-    """The record in a line, without its end; None for one that is not as it was written: cut off, a flipped bit."""
+    """The record in a line, without its end; None for one that is not as it was written: cut off, a flipped bit. Ends of lines that a
+    program made Windows' are none of its bits."""
+    line = line.removesuffix(b"\r")
     if line[:_SIZE] != _HEAD % zlib.crc32(line[_SIZE:]):
         return None
     record: dict[str, Any] = json.loads(b"{" + line[_SIZE:])

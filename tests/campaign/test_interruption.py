@@ -219,6 +219,13 @@ def test_a_flipped_bit_in_the_journal_costs_that_record_and_nothing_else(copy):
         assert without_times(out / "results.csv") == table
 
 
+def test_line_ends_of_windows_cost_nothing(copy):
+    campaign, out = copy
+    journal = out / "cases.jsonl"
+    journal.write_bytes(journal.read_bytes().replace(b"\n", b"\r\n"))
+    assert run_campaign(campaign, out, workers=1).simulated == 0
+
+
 def test_a_record_without_a_column_is_unwritten(copy):
     campaign, out = copy
     records, _ = whole_records((out / "cases.jsonl").read_bytes())
