@@ -203,7 +203,7 @@ def test_exponential_steps_take_the_edge_whirl_for_linear(run):
 
 
 @pytest.mark.slow(reason="compiles a method of every family for these states")
-@pytest.mark.parametrize(  # every family once, every operation with a simple and an exponential method: each pair costs a minute of compiling
+@pytest.mark.parametrize(  # each pair costs a minute of compiling
     ("method", "operation"),
     [("rk4", "fixed"), ("abm4", "controlled"), ("etdrk4", "fixed"), ("etdabm4", "controlled")],
 )
