@@ -91,9 +91,8 @@ def run_block(job: Job) -> list[dict[str, Any]]:
                 record = failed if case.id in wanted else None
             if record is not None:
                 records.append(record)
-                with suppress(
-                    OSError
-                ):  # a full disk, a folder that is gone: the record comes back with the block's
+                # a full disk, a folder that is gone: the record comes back with the block's
+                with suppress(OSError):
                     leave(job.setup.logs.parent, job.cases[0].id, record)
     return records
 

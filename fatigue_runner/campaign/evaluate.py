@@ -199,9 +199,8 @@ def _trained(integration: Integration) -> dict[str, float]:
     try:
         corrector = integration.build().corrector if integration.file else None
     except (
-        FatigueRunnerError,
-        OSError,
-    ):  # its file has gone while the campaign ran: that is said where its cases fail
+        FatigueRunnerError
+    ):  # its file has changed while the campaign ran: that is said where its cases fail
         corrector = None
     return (
         {}

@@ -1,4 +1,4 @@
-"""The only door to parallelism: joblib, on the cores of this machine (loky) or on a dask cluster"""
+"""The only door to parallelism: joblib, on the cores of this machine (loky) or on a dask cluster."""
 
 from __future__ import annotations
 
