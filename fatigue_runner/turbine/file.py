@@ -74,7 +74,7 @@ class Hub(Section):
     """A point mass on the shaft that turns; centre_of_mass: downwind of the rotor apex."""
 
     mass: Positive
-    inertia: Positive
+    inertia: NotNegative
     centre_of_mass: float = 0.0
 
 
@@ -82,7 +82,7 @@ class Nacelle(Section):
     """A rigid body on the tower; its centre of mass: downwind, lateral, up, from the tower top, where the yaw bearing's mass is."""
 
     mass: Positive
-    yaw_inertia: Positive
+    yaw_inertia: NotNegative
     centre_of_mass: list[float] = Field(min_length=3, max_length=3)
     yaw_bearing_mass: NotNegative = 0.0
 

@@ -40,6 +40,9 @@ class Equations(Protocol):
     ) -> Array: ...
 
 
+LARGE = (
+    60.0  # m, rotor radius from which deflections have the sizes below; a smaller rotor's are in proportion
+)
 AZIMUTHS = 24  # of one revolution; three blades and up to the second harmonic repeat well within them
 
 # What is unknown of a steady rotation, in the layout's order: a deflection, or the mean, cosine and sine part over the azimuth of a
@@ -123,6 +126,7 @@ def _steady(
         layout.freedoms,
     )
     at_speed = _speed_row(layout)
+    scale[: at_speed - 1] *= min(1.0, p["radius"] / LARGE)
 
     def residual(z: Array) -> Array:
         unknown = z * scale
@@ -149,7 +153,8 @@ def _steady(
     begin[_flap_row(layout)] *= wind
     for speed, states in guesses:
         found = root(residual, np.array([*begin, speed, *(states / own)]), tol=1e-11)
-        if found.success and np.abs(found.fun).max() < 1e-6 and found.x[at_speed] > slowest:
+        # whether the search says that it ended does not matter: of a small stiff machine rounding is more than its tolerance
+        if np.abs(found.fun).max() < 1e-6 and found.x[at_speed] > slowest:
             return found.x * scale
     raise InputError(
         f"{turbine.name} has no steady rotation at {wind:g} m/s and {np.degrees(pitch):g} deg pitch; "

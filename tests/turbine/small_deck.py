@@ -186,15 +186,16 @@ def aero_blade(**change: object) -> str:
     )
 
 
-def airfoil(lift: bool, tables: int = 1) -> str:
+def airfoil(lift: bool, *more: tuple[float, float, float]) -> str:
+    """more: further tables, each a Reynolds number in millions, a setting, and what lift and drag of the first are multiplied with."""
     text = "! ---- AirfoilInfo ----\n! a comment\nDEFAULT  InterpOrd  ! order\n"
-    text += (
-        '@"thin_coords.txt" NumCoords ! shape\n'
-        + f"{tables} NumTabs ! tables\n0.75 Re ! millions\n0 Ctrl ! setting\n"
-    )
-    text += f"! table\n{len(POLAR_ANGLES)} NumAlf ! lines\n! Alpha Cl Cd Cm\n! (deg) (-) (-) (-)\n"
-    for a, cl, cd in zip(POLAR_ANGLES, LIFT, DRAG, strict=True):
-        text += f"  {a:.2f}  {cl if lift else 0.0:.4f}  {cd if lift else 0.5:.4f}  0.0000\n"
+    text += f'@"thin_coords.txt" NumCoords ! shape\n{1 + len(more)} NumTabs ! tables\n'
+    for reynolds, setting, factor in ((0.75, 0.0, 1.0), *more):
+        text += f"{reynolds} Re ! millions\n{setting:g} Ctrl ! setting\n"
+        text += f"! table\n{len(POLAR_ANGLES)} NumAlf ! lines\n! Alpha Cl Cd Cm\n! (deg) (-) (-) (-)\n"
+        for a, cl, cd in zip(POLAR_ANGLES, LIFT, DRAG, strict=True):
+            cl, cd = (cl, cd) if lift else (0.0, 0.5)
+            text += f"  {a:.2f}  {factor * cl:.4f}  {factor * cd:.4f}  0.0000\n"
     return text
 
 

@@ -23,7 +23,7 @@ def made(folder: Path, version: int = 5, **files: str):
 
 def refusal(folder: Path, version: int = 5, **files: str) -> str:
     with pytest.raises(InputError) as caught:
-        made(folder, version, **files)
+        import_deck(small.write(folder, version, **files), folder / "mine.yaml")
     assert caught.value.exit_code == 2
     told = str(caught.value)
     assert "\n" not in told
@@ -163,6 +163,18 @@ REFUSED = {
         )},
         "they are in radians, give degrees",
     ),
+    "tables of falling Reynolds number": (
+        {"AeroDyn": small.aerodyn(5, AFTabMod=2), "thin": small.airfoil(True, (0.5, 0.0, 1.0))},
+        "Airfoils/thin.dat:22: Re must rise from table to table",
+    ),
+    "fewer tables than said": (
+        {"thin": small.airfoil(True).replace("1 NumTabs", "2 NumTabs")},
+        "Airfoils/thin.dat:5: NumTabs says 2 tables, the file has 1",
+    ),
+    "a number that no turbine has": (
+        {"ElastoDyn": small.elastodyn(5, NacMass=0.0)},
+        "small_ElastoDyn.dat:32: NacMass makes no turbine: nacelle.mass must be above 0; got 0.0",
+    ),
     "an airfoil that is not named": ({"AeroDyn": small.aerodyn(5, NumAFfiles=1)}, "BlAFID 2 is no airfoil"),
     "mode that does not reach 1": ({"blade": small.blade(5).replace("0.9 ", "9.0 ")}, "coefficients BldFl1Sh(2) to (6) must add up to 1"),
     "not text": ({"blade": "binary\0"}, "small_blade.dat: is no text file"),
@@ -249,6 +261,77 @@ def test_prebend_is_kept_and_an_aerodynamic_centre_s_offset_is_not(tmp_path, pla
     offset = made(tmp_path, AeroBlade=small.aero_blade(BlCrvAC=lambda a: -0.1))
     assert offset.data == plain
     assert any("prebend of AeroDyn's blade, up to 0.1 m, is left out" in note for note in offset.notes)
+
+
+def lift_at(result, station: int, angle: float) -> float:
+    name = result.data["aerodynamics"]["stations"]["rows"][station][3]
+    points = np.array(result.airfoils[name])
+    return float(np.interp(angle, points[:, 0], points[:, 1]))
+
+
+def test_of_several_tables_the_first_is_taken_where_the_deck_says_so(tmp_path, plain):
+    result = made(tmp_path, AeroDyn=small.aerodyn(5, AFTabMod=1), thin=small.airfoil(True, (9.0, 0.0, 2.0)))
+    assert result.data == plain and lift_at(result, 3, 8.0) == 1.2
+    assert not any("table" in note for note in result.notes)
+
+
+def test_tables_of_reynolds_numbers_are_interpolated_at_each_station_s_own_in_operation(tmp_path):
+    """By the logarithm, as AeroDyn does; 200 rad/s over the gearbox is the rated rotor speed."""
+    aero = small.aerodyn(5, AFTabMod=2, KinVisc=1.5e-5)
+    result = made(tmp_path, AeroDyn=aero, thin=small.airfoil(True, (1.5, 0.0, 1.1), (7.5, 0.0, 1.6)))
+    span, chord = 30.0 * 0.6, 2.4 - 1.6 * 0.6
+    reynolds = np.hypot(200 / 80 * (2 + span), 8.0) * chord / 1.5e-5
+    share = np.log(reynolds / 1.5e6) / np.log(7.5 / 1.5)
+    assert 0 < share < 1
+    assert lift_at(result, 3, 8.0) == pytest.approx(1.2 * (1.1 + 0.5 * share), rel=1e-4)
+    rows = result.data["aerodynamics"]["stations"]["rows"]
+    assert rows[0][3] == "round" and len({row[3] for row in rows[2:]}) > 2
+    assert any("the rated rotor speed, 23.9 rpm" in note for note in result.notes)
+    # beyond the tables the last one holds
+    outside = made(tmp_path, AeroDyn=aero, thin=small.airfoil(True, (0.8, 0.0, 1.5)))
+    assert lift_at(outside, 3, 8.0) == pytest.approx(1.8)
+
+
+def test_tables_of_a_user_s_property_are_taken_at_zero(tmp_path):
+    aero = small.aerodyn(5, AFTabMod=3)
+    thin = small.airfoil(True, (0.75, 10.0, 3.0)).replace("\n0 Ctrl", "\n-5 Ctrl")
+    result = made(tmp_path, AeroDyn=aero, thin=thin)
+    assert lift_at(result, 3, 8.0) == pytest.approx(1.2 * (1 + 2 / 3), rel=1e-4)
+    assert any("AFTabMod 3" in note for note in result.notes)
+
+
+def test_a_polar_of_one_row_holds_at_any_angle_as_in_aerodyn(tmp_path, plain):
+    text = small.airfoil(False)
+    rows = [line for line in text.split("\n") if line.startswith("  ")]
+    short = text.replace("\n".join(rows), rows[4]).replace(f"{len(rows)} NumAlf", "1 NumAlf")
+    result = made(tmp_path, round=short)
+    assert result.data == plain
+    assert result.airfoils["round"] == [[-180.0, 0.0, 0.5], [0.0, 0.0, 0.5], [180.0, 0.0, 0.5]]
+
+
+def test_a_member_of_one_station_is_uniform(tmp_path):
+    text = "\n".join(
+        line for line in small.tower(NTwInpSt=1).split("\n") if not line.startswith((" 5.0", " 1.0"))
+    )
+    rows = made(tmp_path, tower=text).data["tower"]["stations"]["rows"]
+    assert rows == [[0.0, 3000.0, 6e10, 6e10], [1.0, 3000.0, 6e10, 6e10]]
+
+
+def test_a_torque_that_steps_to_its_rated_value_becomes_a_ramp(tmp_path):
+    servo = small.servodyn(
+        VSContrl=1, PCMode=0, VS_Rgn2K=0.0013, VS_RtGnSp=1900.0, VS_RtTq=5000.0, VS_SlPc=9.9999e-6
+    )
+    result = made(tmp_path, ServoDyn=servo)
+    assert result.data["generator"]["regions"]["slip_percent"] == 2.0
+    assert any("VS_SlPc 9.9999e-06 %" in note for note in result.notes)
+
+
+def test_a_file_of_a_deck_that_was_moved_is_pointed_at(tmp_path):
+    path = small.write(tmp_path / "runs" / "one", fst=small.fst(5, EDFile='"../../../base/the.dat"'))
+    (tmp_path / "base").mkdir()
+    (tmp_path / "base" / "the.dat").write_text(small.elastodyn(5))
+    with pytest.raises(InputError, match=rf"which is not there; .* \(there is {tmp_path}/base/the.dat\)"):
+        read_deck(path)
 
 
 def test_modes_that_a_deck_does_not_have_follow_from_its_stiffness(tmp_path):

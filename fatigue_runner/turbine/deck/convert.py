@@ -11,7 +11,8 @@ import numpy as np
 from fatigue_runner.errors import InputError
 from fatigue_runner.turbine.deck import rosco
 from fatigue_runner.turbine.deck.files import Deck
-from fatigue_runner.turbine.deck.text import DeckFile, Table, number, spelled
+from fatigue_runner.turbine.deck.polars import station_polars
+from fatigue_runner.turbine.deck.text import DeckFile, Table, spelled
 
 BENT = 0.01  # of the length; a blade that is bent by less is taken as straight
 LONGEST_TIP, TIP_PARTS = (
@@ -23,6 +24,37 @@ STIFFEST_SHAFT_HZ = 6.0  # torsion above that, which nothing excites, is taken a
 STEP = 1e-6  # of the length; two stations nearer than that are one place where the section jumps
 POLAR_SMOOTHING_DEG = 1.0
 SHAPE = range(2, 7)
+
+# Keys of the deck whose numbers stand in a turbine file as they are
+ORIGINS = {
+    "environment.air_density": "AirDens",
+    "environment.gravity": "Gravity",
+    "geometry.tip_radius": "TipRad",
+    "geometry.hub_radius": "HubRad",
+    "geometry.precone_deg": "PreCone(1)",
+    "geometry.shaft_tilt_deg": "ShftTilt",
+    "geometry.tower_height": "TowerHt",
+    "hub.mass": "HubMass",
+    "hub.inertia": "HubIner",
+    "nacelle.mass": "NacMass",
+    "nacelle.yaw_inertia": "NacYIner",
+    "nacelle.yaw_bearing_mass": "YawBrMass",
+    "drivetrain.gearbox_ratio": "GBRatio",
+    "drivetrain.torsional_damping": "DTTorDmp",
+    "drivetrain.generator_inertia": "GenIner",
+    "generator.optimal_gain": "VS_Rgn2K",
+    "generator.regions.region_3_speed_rpm": "VS_RtGnSp",
+    "generator.regions.rated_torque": "VS_RtTq",
+    "control.filter_frequency_hz": "F_LPFCornerFreq",
+    "control.largest_torque": "VS_MaxTq",
+    "blade.mass_factor": "AdjBlMs",
+    "blade.flap_stiffness_factor": "AdjFlSt",
+    "blade.edge_stiffness_factor": "AdjEdSt",
+    "blade.tip_mass": "TipMass(1)",
+    "tower.mass_factor": "AdjTwMa",
+    "tower.fore_aft_stiffness_factor": "AdjFASt",
+    "tower.side_side_stiffness_factor": "AdjSSSt",
+}
 
 
 @dataclass(frozen=True)
@@ -244,7 +276,10 @@ def _mode(file: DeckFile, stem: str, notes: list[str]) -> list[float] | None:
 def _stations(
     file: DeckFile, columns: list[list[float]], lines: tuple[int, ...], name: str, positive: tuple[int, ...]
 ) -> list[list[float]]:
-    """Rows that run from 0 to 1 and rise, by the table's first column; a jump (two stations at one place) becomes a short ramp."""
+    """Rows that run from 0 to 1 and rise, by the table's first column; a jump (two stations at one place) becomes a short ramp, a
+    single station a uniform member."""
+    if len(columns[0]) == 1:
+        columns, lines = [[0.0, 1.0], *(column * 2 for column in columns[1:])], lines * 2
     place = columns[0]
     for line, (low, high) in zip(lines[1:], pairwise(place), strict=True):
         if high < low - STEP:
@@ -342,8 +377,8 @@ def _diameters(aero: DeckFile, top: float) -> list[list[float]]:
 def _skewed_wake(aero: DeckFile) -> bool:
     """Whether AeroDyn's induction follows a skewed wake: Pitt & Peters in old files, Glauert's in new ones."""
     if aero.has("Skew_Mod"):
-        return aero.number("Skew_Mod", default=1) == 1 and aero.number("SkewRedistr_Mod", default=1) != 0
-    return aero.number("SkewMod", default=2) != 1
+        return aero.switch("Skew_Mod", default=1) == 1 and aero.switch("SkewRedistr_Mod", default=1) != 0
+    return aero.switch("SkewMod", default=2) != 1
 
 
 def _aerodynamics(deck: Deck, notes: list[str]) -> tuple[dict[str, list[list[float]]], dict[str, Any]]:
@@ -373,16 +408,12 @@ def _aerodynamics(deck: Deck, notes: list[str]) -> tuple[dict[str, list[list[flo
             raise InputError(
                 f"{file.path}:{line}: BlAFID {index} is no airfoil; {deck.aero.path.name} names {len(deck.airfoils)}"
             )
-    names = _airfoil_names(deck)
-    used = sorted(set(numbers))
-    polars = {names[i - 1]: _polar(deck, deck.airfoils[i - 1], notes) for i in used}
+    polars = station_polars(deck, numbers, span, chord, notes)
     columns = ["span", "chord", "twist_deg", "airfoil"]
-    rows: list[list[Any]] = [
-        [s, c, t, names[i - 1]] for s, c, t, i in zip(span, chord, twist, numbers, strict=True)
-    ]
+    rows: list[list[Any]] = [list(row) for row in zip(span, chord, twist, polars.names, strict=True)]
     _bend(file, table, length, columns, rows, notes)
     rows = _finer_tip(rows, columns.index("airfoil"), length, notes)
-    return polars, {"columns": columns, "rows": rows}
+    return polars.points, {"columns": columns, "rows": rows}
 
 
 def _bend(
@@ -429,63 +460,3 @@ def _finer_tip(rows: list[list[Any]], name: int, length: float, notes: list[str]
             ]
         )
     return [*rows[:-1], *between, tip]
-
-
-def _airfoil_names(deck: Deck) -> list[str]:
-    """Names of the files without what they share; numbered where two are the same."""
-    stems = [file.path.stem for file in deck.airfoils]
-    out: list[str] = []
-    for stem in stems:
-        name = stem
-        while name in out:
-            name += "-b"
-        out.append(name)
-    return out
-
-
-def _polar(deck: Deck, file: DeckFile, notes: list[str]) -> list[list[float]]:
-    """[[deg, lift, drag], ...] of an airfoil's first table, whose columns AeroDyn's file numbers."""
-    tables = file.number("NumTabs", default=1)
-    if tables > 1:
-        _say_once(
-            notes,
-            f"airfoils with several tables (Reynolds numbers or flap settings): the first is taken, as OpenFAST does with AFTabMod 1; "
-            f"the deck has AFTabMod {deck.aero.number('AFTabMod', default=1):g}",
-        )
-    columns = [
-        int(deck.aero.number(f"InCol_{n}", default=d)) - 1 for n, d in (("Alfa", 1), ("Cl", 2), ("Cd", 3))
-    ]
-    count, entry = file.count("NumAlf"), file.entry("NumAlf")
-    lines, rows = file.rows(entry.line + 1, count, 1 + max(columns), "NumAlf")
-    points: list[list[float]] = []
-    for line, row in zip(lines, rows, strict=True):
-        values = [number(row[c]) for c in columns]
-        if any(v is None for v in values):
-            raise InputError(
-                f"{file.path}:{line}: angle, lift and drag must be numbers; got {' '.join(row)!r:.60}"
-            )
-        point = [float(v) for v in values if v is not None]
-        if points and point[0] <= points[-1][0]:
-            if point[0] == points[-1][0]:
-                continue
-            raise InputError(
-                f"{file.path}:{line}: the angles of attack must rise; got {point[0]:g} after {points[-1][0]:g} deg"
-            )
-        points.append(point)
-    first, last = points[0][0], points[-1][0]
-    if len(points) > 2 and -3.3 < first < -3.0 and 3.0 < last < 3.3:
-        raise InputError(
-            f"{file.path}:{lines[0]}: the angles of attack run from {first:g} to {last:g}: they are in radians, give degrees"
-        )
-    if first > -179.9 or last < 179.9:
-        raise InputError(
-            f"{file.path}:{lines[0] if first > -179.9 else lines[-1]}: the polar reaches from {first:g} to {last:g} deg; blades meet all "
-            "angles, it must go from -180 to 180 (Viterna's method extends one)"
-        )
-    points[0][0], points[-1][0] = min(first, -180.0), max(last, 180.0)
-    return points
-
-
-def _say_once(notes: list[str], text: str) -> None:
-    if text not in notes:
-        notes.append(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from fatigue_runner.turbine.deck.text import DeckFile, read_deck_file
 
 NOTHING = {"", "none", "unused", "default", "n/a"}
 
+LEVELS = 4  # of folders above a file, where one that it names may lie
 STEEPEST_SHAFT = 45.0  # deg; beyond it the axis is called vertical
 
 
@@ -68,7 +70,7 @@ def read_deck(path: Path) -> Deck:
         for line, name in aero.texts(count, "AFNames")
     )
     missing: list[str] = []
-    servo = _sub_file(main, "ServoFile", "a ServoDyn file") if main.number("CompServo", default=1) else None
+    servo = _sub_file(main, "ServoFile", "a ServoDyn file") if main.switch("CompServo", default=1) else None
     discon = None
     if servo is not None and servo.has("DLL_InFile") and _uses_library(servo):
         discon = _optional(servo, "DLL_InFile", "a controller's input file", missing)
@@ -116,11 +118,11 @@ def _main(path: Path) -> DeckFile:
 
 def _refuse_other_kinds(main: DeckFile, elasto: DeckFile) -> None:
     """One sentence for a turbine that the model's equations are not those of."""
-    if main.number("MHK", default=0) != 0:
+    if main.switch("MHK", default=0) != 0:
         raise InputError(f"{main.where('MHK')}: the turbine runs under water; this model is of wind turbines")
     if main.number("NRotors", default=1) != 1:
         raise InputError(f"{main.where('NRotors')}: the deck has several rotors, this model has one")
-    if main.number("CompElast") == 3:
+    if main.switch("CompElast") == 3:
         raise InputError(
             f"{main.where('CompElast')}: the deck is of simplified ElastoDyn, which has no flexible blades or tower; "
             "a deck with ElastoDyn's blade and tower files is needed"
@@ -141,7 +143,7 @@ def _refuse_other_kinds(main: DeckFile, elasto: DeckFile) -> None:
         raise InputError(
             f"{floats}: the turbine floats; the model's tower is clamped at its foot, it has no platform motion"
         )
-    aero = main.number("CompAero")
+    aero = main.switch("CompAero")
     text = (main.path.parent / _plain(main.text("AeroFile"))).name
     if aero == 0:
         raise InputError(
@@ -156,16 +158,16 @@ def _refuse_other_kinds(main: DeckFile, elasto: DeckFile) -> None:
 
 def _floating(main: DeckFile, elasto: DeckFile) -> str:
     """The place that says that the turbine floats, or nothing. Platform freedoms alone say nothing: they are on for SubDyn, too."""
-    if main.number("CompMooring", default=0) != 0:
+    if main.switch("CompMooring", default=0) != 0:
         return main.where("CompMooring")
-    hydro = main.number("CompHydro", default=0) != 0
-    if hydro and main.number("CompSub", default=0) == 0 and elasto.flag("PtfmHvDOF", default=False):
+    hydro = main.switch("CompHydro", default=0) != 0
+    if hydro and main.switch("CompSub", default=0) == 0 and elasto.flag("PtfmHvDOF", default=False):
         return elasto.where("PtfmHvDOF")
     return ""
 
 
 def _uses_library(servo: DeckFile) -> bool:
-    return 5 in (servo.number("VSContrl", default=0), servo.number("PCMode", default=0))
+    return 5 in (servo.switch("VSContrl", default=0), servo.switch("PCMode", default=0))
 
 
 def _blades(file: DeckFile, spellings: tuple[str, ...], key: str, what: str) -> list[DeckFile]:
@@ -222,9 +224,18 @@ def _located(file: DeckFile, line: int, key: str, name: str) -> Path:
         return beside
     if found.is_dir():
         raise InputError(f"{where}: {key} names a folder, {found}; a file is needed")
+    near = _nearby(file.path, plain)
     raise InputError(
         f"{where}: {key} names {plain}, which is not there; put the file at {found}, or correct the line"
+        f"{f' (there is {near})' if near else ''}"
     )
+
+
+def _nearby(asking: Path, plain: str) -> Path | None:
+    """A file of that name in the deck's folder or above, as where a deck was moved a folder up or down."""
+    tail = re.sub(r"^(\.*/)+", "", plain)
+    folders = asking.resolve().parents[:LEVELS]
+    return next((path for folder in folders if (path := folder / tail).is_file()), None)
 
 
 def _whatever_case(path: Path) -> Path | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from fatigue_runner.inputs.section import validated
 from fatigue_runner.inputs.source import parse_mapping
 from fatigue_runner.turbine.aerodynamics import LOAD_NAMES, blade_aerodynamics, power_coefficient, rotor_loads
 from fatigue_runner.turbine.beam import INTEGRAND_NAMES, blade_modes
-from fatigue_runner.turbine.deck.convert import Converted, converted
+from fatigue_runner.turbine.deck.convert import ORIGINS, Converted, converted
 from fatigue_runner.turbine.deck.files import Deck, read_deck
 from fatigue_runner.turbine.deck.omissions import Omission, omissions
 from fatigue_runner.turbine.deck.written import airfoils_text, turbine_text
@@ -33,9 +34,7 @@ from fatigue_runner.turbine.table_builder import (
     write_tables,
 )
 
-# Weight bends the 5-MW's blades by 0.7 % of their length: with one edge mode for all its flap load in shear is 3 % off OpenFAST's. It is
-# 18 % off on the IEA-3.4 (0.9 %), and 0.4 % with a mode for each blade.
-SOFT_EDGE = 0.008
+OWN_EDGES = "t2b2cg"  # each blade with an edge mode of its own, as the decks have; `model: t2b1i1cg` in the file has one for all
 POOR_MODE = 0.02  # a polynomial's frequency off its own beam's
 TYPICAL_WIND = 8.0  # m/s: the mean at most sites, below rated of all turbines, where loads grow with the wind
 
@@ -82,11 +81,12 @@ def import_deck(
     # what is written is what tables are made from, digit by digit
     airfoils = parse_mapping(polars, paths["airfoils"], "polar file", "airfoils")
     rows = validated(AirfoilFile, airfoils).airfoils
-    checked = _checked(data, target)
+    checked, left_out = _checked(data, target, read), tuple(omissions(read, data))
     notes = list(made.notes)
+    _tell_modes(checked, notes)
     if "prebend" in data["aerodynamics"]["stations"]["columns"]:
         data["aerodynamics"]["deflection"] = round(_deflection(checked, rows), 3)
-        checked = _checked(data, target)
+        checked = _checked(data, target, read)
         notes.append(
             f"the blade is prebent so that the wind straightens it: its tables are made with the tip "
             f"{data['aerodynamics']['deflection']:g} m "
@@ -109,7 +109,7 @@ def import_deck(
     )
     part.replace(paths["tables"])
     write_atomically(target, text.encode())
-    return Imported(target, paths["airfoils"], paths["tables"], tuple(notes), tuple(omissions(read, data)))
+    return Imported(target, paths["airfoils"], paths["tables"], tuple(notes), left_out)
 
 
 def _deflection(checked: dict[str, Any], airfoils: dict[str, Any]) -> float:
@@ -125,15 +125,6 @@ def _deflection(checked: dict[str, Any], airfoils: dict[str, Any]) -> float:
     stretched, coned = (modes.integrals[place["r"], place[name]] for name in ("S_ff", "phi_x"))
     force -= speed**2 * np.sin(blade.cone) * np.cos(blade.cone) * coned
     return float(force / (modes.flap_stiffness + speed**2 * stretched) * modes.flap_tip[0])
-
-
-def _edgewise_sag(checked: dict[str, Any]) -> float:
-    """By how much its own weight bends the horizontal blade edgewise, over its length."""
-    modes, place = blade_modes(checked), {name: i for i, name in enumerate(INTEGRAND_NAMES)}
-    weight = checked["environment"]["gravity"] * float(modes.integrals[place["1"], place["psi_y"]])
-    return float(
-        abs(weight / modes.edge_stiffness * modes.edge_tip[1]) / (modes.tip_radius - modes.hub_radius)
-    )
 
 
 def _tell_modes(checked: dict[str, Any], notes: list[str]) -> None:
@@ -152,7 +143,7 @@ def _tell_modes(checked: dict[str, Any], notes: list[str]) -> None:
 def _with_origin(made: Converted, read: Deck, deck: Path, files: dict[str, str]) -> dict[str, Any]:
     """The mapping with the names of its files, and which deck it is from."""
     data = dict(made.data)
-    data = {"name": data.pop("name"), "model": None, **data}
+    data = {"name": data.pop("name"), "model": OWN_EDGES, **data}
     data["aerodynamics"] = {**files, **data["aerodynamics"]}
     root = deck.resolve().parent
     hashes = {
@@ -162,10 +153,30 @@ def _with_origin(made: Converted, read: Deck, deck: Path, files: dict[str, str])
     return data
 
 
-def _checked(data: dict[str, Any], target: Path) -> dict[str, Any]:
-    """The mapping as its file will be read; a torque law that is not known yet is any."""
+def _checked(data: dict[str, Any], target: Path, read: Deck) -> dict[str, Any]:
+    """The mapping as its file will be read; a torque law that is not known yet is any. Raises InputError with the deck's own lines, since
+    the file is not there."""
     known = data if data["generator"] else {**data, "generator": {"law": "optimal", "optimal_gain": 1.0}}
-    return check_turbine(parse_mapping(turbine_text(known, ()), target, "turbine", "name, blade, tower, ..."))
+    try:
+        return check_turbine(
+            parse_mapping(turbine_text(known, ()), target, "turbine", "name, blade, tower, ...")
+        )
+    except InputError as error:
+        raise InputError(_told_of_the_deck(str(error), target, read)) from None
+
+
+def _told_of_the_deck(text: str, target: Path, read: Deck) -> str:
+    """What is wrong with a file that would have been written, with the place of the deck that says it."""
+
+    def place(found: re.Match[str]) -> str:
+        name = found[1]
+        key = ORIGINS.get(name)
+        file = next((f for f in read.files if key and f.has(key)), None)
+        if key is None or file is None:
+            return f"{read.main.path}: the deck makes no turbine: {name}"
+        return f"{file.where(key)}: {key} makes no turbine: {name}"
+
+    return re.sub(rf"{re.escape(str(target))}(?::\d+)?: ([\w.]*)", place, text)
 
 
 def _optimal(data: dict[str, Any], coefficients: Any, notes: list[str]) -> dict[str, Any]:

@@ -17,6 +17,8 @@ class Omission:
     means: str
 
 
+LEAST_PITCH = 0.05  # deg, that is worth a word
+
 # Degrees of freedom of ElastoDyn that the model has not, by their keys.
 _FREEDOMS = {
     "FlapDOF2": (
@@ -48,20 +50,14 @@ _FREEDOMS = {
 
 def omissions(deck: Deck, data: Mapping[str, Any]) -> list[Omission]:
     """In the order of the deck: structure, support, aerodynamics, control. data: the turbine's mapping."""
-    return [*_structure(deck, data), *_support(deck, data), *_aerodynamics(deck), *_control(deck, data)]
+    return [*_structure(deck), *_support(deck, data), *_aerodynamics(deck), *_control(deck, data)]
 
 
-def _structure(deck: Deck, data: Mapping[str, Any]) -> Iterator[Omission]:
+def _structure(deck: Deck) -> Iterator[Omission]:
     elasto, main = deck.elasto, deck.main
     for key, (name, means) in _FREEDOMS.items():
         if elasto.flag(key, default=False):
             yield Omission(f"{name} ({key} is on)", means)
-    if elasto.flag("EdgeDOF", default=True) and data.get("model") != "t2b2cg":
-        yield Omission(
-            "edgewise modes of single blades (EdgeDOF)",
-            "the model's edge mode is collective: edgewise DELs in turbulence are 3 to 7 % below OpenFAST's on the 5-MW; whirling in the "
-            "plane of the rotor is not there",
-        )
     off = [
         key
         for key in ("FlapDOF1", "EdgeDOF", "DrTrDOF", "GenDOF", "TwFADOF1", "TwSSDOF1")
@@ -72,7 +68,7 @@ def _structure(deck: Deck, data: Mapping[str, Any]) -> Iterator[Omission]:
             f"switches of somebody's run: {', '.join(off)} off",
             "the model always has these degrees of freedom; a comparison with this deck's own run needs them on",
         )
-    if main.number("CompElast") == 2:
+    if main.switch("CompElast") == 2:
         yield Omission(
             "BeamDyn's blades (CompElast 2)",
             "taken are ElastoDyn's blades of the same deck, which have no torsion and bend in one flap and one edge mode",
@@ -102,19 +98,19 @@ def _structure(deck: Deck, data: Mapping[str, Any]) -> Iterator[Omission]:
 
 def _support(deck: Deck, data: Mapping[str, Any]) -> Iterator[Omission]:
     main, foot = deck.main, data["geometry"]["tower_base_height"]
-    if main.number("CompSub", default=0) or main.number("CompSoil", default=0):
+    if main.switch("CompSub", default=0) or main.switch("CompSoil", default=0):
         yield Omission(
-            f"the substructure (CompSub {main.number('CompSub', default=0):g})",
+            f"the substructure (CompSub {main.switch('CompSub', default=0)})",
             f"the tower is clamped at {foot:g} m: its frequencies are higher than on its foundation, which the "
             f"deck has; where 1P or 3P come "
             "near the real ones, the tower's DEL is another",
         )
-    if main.number("CompHydro", default=0):
+    if main.switch("CompHydro", default=0):
         yield Omission(
             "waves and current (CompHydro)",
             "loads from waves are not there, offshore a large part of the tower's fatigue",
         )
-    if main.number("CompIce", default=0):
+    if main.switch("CompIce", default=0):
         yield Omission("ice (CompIce)", "loads from ice are not there")
     mass = deck.elasto.number("PtfmMass", default=0.0)
     if mass:
@@ -125,7 +121,7 @@ def _support(deck: Deck, data: Mapping[str, Any]) -> Iterator[Omission]:
 
 def _aerodynamics(deck: Deck) -> Iterator[Omission]:
     aero = deck.aero
-    wake = int(aero.number("Wake_Mod", "WakeMod", default=1))
+    wake = aero.switch("Wake_Mod", "WakeMod", default=1)
     if wake == 0:
         yield Omission(
             "a rotor without induction (Wake_Mod 0)",
@@ -136,15 +132,15 @@ def _aerodynamics(deck: Deck) -> Iterator[Omission]:
             "the free-vortex wake, OLAF (Wake_Mod 3)",
             "the tables are of blade elements in momentum balance with the wake at once, without its memory",
         )
-    if wake == 2 or (aero.number("DBEMT_Mod", default=0) > 0 and aero.has("Wake_Mod")):
+    if wake == 2 or (aero.switch("DBEMT_Mod", default=0) > 0 and aero.has("Wake_Mod")):
         yield Omission(
             "dynamic inflow (DBEMT)",
             "induction follows wind and pitch at once: loads after gusts and pitch steps overshoot less than they should",
         )
     unsteady = (
-        aero.number("UA_Mod", default=0) > 0
+        aero.switch("UA_Mod", default=0) > 0
         if aero.has("UA_Mod")
-        else aero.number("AFAeroMod", default=1) == 2
+        else aero.switch("AFAeroMod", default=1) == 2
     )
     if unsteady:
         yield Omission(
@@ -152,7 +148,7 @@ def _aerodynamics(deck: Deck) -> Iterator[Omission]:
             "polars are quasi-steady: with dynamic stall and wake OpenFAST has 4 % more flap DEL on the 5-MW at "
             "8 m/s; more where blades stall",
         )
-    if aero.number("TwrPotent", default=0) or aero.number("TwrShadow", default=0):
+    if aero.switch("TwrPotent", default=0) or aero.switch("TwrShadow", default=0):
         yield Omission(
             "the tower's influence on the wind (TwrPotent, TwrShadow)",
             "off by default: a campaign switches it on with `wind: {tower_influence: true}` (docs/wind.md), 3P loads depend on it",
@@ -192,12 +188,18 @@ def _control(deck: Deck, data: Mapping[str, Any]) -> Iterator[Omission]:
     if servo is None:
         yield Omission("no ServoDyn (CompServo 0)", "the deck has no controller; see the torque law above")
         return
+    pitch, mode = deck.elasto.number("BlPitch(1)", default=0.0), servo.switch("PCMode", default=0)
+    if mode == 0 and abs(pitch) >= LEAST_PITCH:
+        yield Omission(
+            f"the pitch at which the blades stand (PCMode 0, BlPitch(1) {pitch:g} deg)",
+            f"nothing here turns them by itself: `pitch: {pitch:g}` in a campaign with `operation: fixed`, or loads are those of 0 deg",
+        )
     if data.get("control") is None:
         yield Omission(
-            f"the pitch controller (PCMode {servo.number('PCMode', default=0):g})",
+            f"the pitch controller (PCMode {mode})",
             "there is none that this program can read: only `operation: fixed` works, loads above rated need a `control` section",
         )
-    if servo.number("YCMode", default=0):
+    if servo.switch("YCMode", default=0):
         yield Omission(
             "yaw control (YCMode)",
             "the rotor always faces the mean wind; loads from yaw errors are not there",

@@ -14,6 +14,7 @@ from fatigue_runner.turbine.deck.text import DeckFile
 
 PLACEHOLDER = 9999.0  # and above, and 0: a number that stands for none
 RPM = pi / 30
+LEAST_SLIP, USUAL_SLIP = 2.0, 10.0  # percent
 
 # The reference turbine's smooth corners over its rated torque and speed (data/nrel5mw.yaml); another turbine's are the same share.
 _BLEND, _CONTROL_BLEND = 900.0 / 43093.55, 300.0 / 43093.55
@@ -31,13 +32,29 @@ class Steering:
 
 def steering(deck: Deck, drivetrain: dict[str, Any], notes: list[str]) -> Steering:
     """From the deck's ROSCO input where its controller is ROSCO's, else from ServoDyn's simple law; what was decided goes to `notes`."""
-    if deck.discon is not None and deck.discon.has("VS_Rgn2K", "PC_RefSpd", "VS_RtPwr"):
+    if deck.discon is not None and _of_rosco(deck.discon):
         return _rosco(deck.discon, notes)
-    if deck.servo is not None and deck.servo.number("VSContrl", default=0) == 1:
+    if deck.servo is not None and deck.servo.switch("VSContrl", default=0) == 1:
         found = _simple(deck.servo, notes)
         if found is not None:
             return found
     return Steering({}, None)
+
+
+def rated_rotor_speed(deck: Deck) -> float | None:
+    """[rad/s] of the rotor, from the same places as the torque law; None where the deck tells none."""
+    ratio = deck.elasto.number("GBRatio")
+    if deck.discon is not None and _of_rosco(deck.discon):
+        return deck.discon.number("PC_RefSpd") / ratio
+    if deck.servo is not None and deck.servo.switch("VSContrl", default=0) == 1:
+        speed = deck.servo.number("VS_RtGnSp")
+        if 0 < speed < PLACEHOLDER:
+            return speed * RPM / ratio
+    return None
+
+
+def _of_rosco(discon: DeckFile) -> bool:
+    return discon.has("VS_Rgn2K", "PC_RefSpd", "VS_RtPwr")
 
 
 def _simple(servo: DeckFile, notes: list[str]) -> Steering | None:
@@ -61,12 +78,26 @@ def _simple(servo: DeckFile, notes: list[str]) -> Steering | None:
         "law": "regions",
         "regions": {
             "region_3_speed_rpm": speed,
-            "slip_percent": servo.number("VS_SlPc") or 10.0,
+            "slip_percent": _slip(servo, notes),
             "rated_torque": torque,
             "blend_torque": round(_BLEND * torque, 6),
         },
     }
     return Steering(generator, None)
+
+
+def _slip(servo: DeckFile, notes: list[str]) -> float:
+    """VS_SlPc; the vanishing ones of decks that mean no ramp make the torque a step, which no step in time follows."""
+    value = servo.number("VS_SlPc")
+    if value >= PLACEHOLDER:
+        return USUAL_SLIP
+    if value < LEAST_SLIP:
+        notes.append(
+            f"VS_SlPc {value:g} % ({servo.where('VS_SlPc')}) is a step of the torque to its rated value: it is a ramp over "
+            f"{LEAST_SLIP:g} % of the speed here, which steps in time can follow"
+        )
+        return LEAST_SLIP
+    return value
 
 
 def _reached(speed: float, torque: float, gain: float) -> bool:
@@ -96,7 +127,7 @@ def _rosco(discon: DeckFile, notes: list[str]) -> Steering:
         )
     regions: dict[str, Any] = {
         "region_3_speed_rpm": round(0.99 * rated / RPM, 6),
-        "slip_percent": 10.0,
+        "slip_percent": USUAL_SLIP,
         "blend_torque": round(_BLEND * torque, 6),
     }
     regions["rated_mechanical_power" if constant_power else "rated_torque"] = (

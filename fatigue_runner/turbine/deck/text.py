@@ -98,13 +98,23 @@ class DeckFile:
         if default is not None and not self.has(*keys):
             return default
         entry = self.entry(*keys)
-        value = number(entry.values[0]) if entry.values else None
-        if value is not None:
-            return value
         text = entry.values[0].strip("\"'") if entry.values else ""
         if default is not None and text.lower() == "default":
             return default
-        raise InputError(f"{self.path}:{entry.line}: {keys[0]} must be a number; got {text!r:.40}")
+        return self.number_of(entry, keys[0])
+
+    def all(self, *keys: str) -> list[Entry]:
+        """Every line with one of the keys, which are spellings of one, in the order of the file."""
+        found = [entry for key in keys for entry in self.entries.get(spelled(key), ())]
+        return sorted(found, key=lambda entry: entry.line)
+
+    def number_of(self, entry: Entry, key: str) -> float:
+        """The number that a line begins with; key: as it is called in messages."""
+        value = number(entry.values[0]) if entry.values else None
+        if value is None:
+            text = entry.values[0].strip("\"'") if entry.values else ""
+            raise InputError(f"{self.path}:{entry.line}: {key} must be a number; got {text!r:.40}")
+        return value
 
     def numbers(self, *keys: str) -> list[float]:
         """All numbers before a key."""
@@ -136,6 +146,15 @@ class DeckFile:
         if value is not None:
             return value != 0
         raise InputError(f"{self.path}:{entry.line}: {keys[0]} must be True or False; got {word!r:.40}")
+
+    def switch(self, *keys: str, default: int | None = None) -> int:
+        """The number of a key that some versions write as True or False: 1 or 0; `default` as for a number."""
+        if self.has(*keys):
+            entry = self.entry(*keys)
+            word = entry.values[0].strip("\"'").lower() if entry.values else ""
+            if word in _TRUE | _FALSE:
+                return int(word in _TRUE)
+        return int(self.number(*keys, default=default))
 
     def text(self, *keys: str, default: str | None = None) -> str:
         """The text of a key, without its quotes."""
