@@ -299,8 +299,8 @@ _DRIVETRAIN = (
     ),
 )  # fmt: skip
 
-# CADynTurb's models: two tower modes, one flap mode of each blade, a collective edge mode (T2B1i1cG) or one of each blade (T2B2cG),
-# rotor and generator
+# Two tower modes, one flap mode of each blade, a collective edge mode (CADynTurb's T2B1i1cG) or one of each blade, rotor and generator.
+# CADynTurb's T2B2cG has flap and edge for all blades together: T2B2CG with equal ones
 T2B1I1CG = Layout((*_TOWER, *_FLAPS, _metres("edge", "collective edge"), *_DRIVETRAIN), WIND)
 T2B2CG = Layout((*_TOWER, *_FLAPS, *_EDGES, *_DRIVETRAIN), WIND)
 DEFAULT_FAMILY = "t2b1i1cg"

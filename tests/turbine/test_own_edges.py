@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
+import cadynturb
 import numpy as np
 import pytest
 from independent_model import IndependentModel
 from scipy.optimize import root
 from simulating import simulate_block
-from test_equations import free_turbine, violent_states
+from test_equations import free_turbine, needs_shared, violent_states
 
 import fatigue_runner as fr
 from fatigue_runner.corrector import features, find
@@ -22,6 +24,7 @@ from fatigue_runner.logbook import read_log, write_log
 from fatigue_runner.turbine import Turbine, load_turbine
 from fatigue_runner.turbine.dynamics import UNCONTROLLED
 from fatigue_runner.turbine.file import read_turbine_file
+from fatigue_runner.turbine.generated.kernel import TABLES
 from fatigue_runner.turbine.parameters import at_pitch
 from fatigue_runner.viewer.scene import geometry
 from fatigue_runner.wind import ConstantWind
@@ -66,6 +69,43 @@ def test_energy_is_conserved_over_100_s_without_damping_aerodynamics_and_torque(
         energy = np.array([model.energy(row) for row in run.state])
         rotation = 0.5 * 3.5e7 * run.state[0, T2B2CG.rotor_speed] ** 2  # J
         assert np.ptp(energy) / rotation < 1e-9
+
+
+@needs_shared
+def test_three_equal_flaps_and_edges_are_cadynturb_s_t2b2cg():
+    """CADynTurb's model of that name has one flap and one edge mode for all blades: ours under the constraint of equal ones.
+
+    cadynturb_t2b2cg.csv: accelerations that its generated equations (model/T2B2cG at commit 7d34997 of jgeisler0303/CADynTurb) give in
+    twelve states, without aerodynamics, its generator torque 2.332287 N.m.s2 times the speed squared. It is linear in the blades'
+    deflections, which are large in the first eight states (flap up to 5 m) and a thirtieth of that in the last four.
+    """
+    data = cadynturb.load()
+    still = {name: 0.0 * values for name, values in cadynturb.tables(data).items() if name in TABLES}
+    turbine = own_edges(
+        load_turbine(
+            {
+                "name": "cadyn",
+                "parameters": cadynturb.parameters(data),
+                "tables": {"tip_speed_ratio": data["tip_speed_ratio"], "coefficients": still},
+                "interpolation": "bilinear",
+            }
+        )
+    )
+    rows = np.loadtxt(Path(__file__).with_name("cadynturb_t2b2cg.csv"), delimiter=",", skiprows=1)
+    q, rates, expected = np.split(rows, 3, axis=1)
+    shared = [0, 1, *[2] * 3, *[3] * 3, 4, 5]  # which of theirs each of our coordinates is
+    bound = np.eye(6)[shared]
+    x = np.concatenate([q @ bound.T, rates @ bound.T], axis=1)
+    free = turbine.rhs(x.T, 8.0)[FREEDOMS:].T
+    model = IndependentModel(turbine.parameters, own_edges=True)
+    masses = [bound.T @ model.mass_matrix(row[:FREEDOMS]) for row in x]
+    held = np.array([np.linalg.solve(m @ bound, m @ a) for m, a in zip(masses, free, strict=True)])
+    for states, bars in (
+        (slice(0, 8), (0.002, 0.003, 0.01, 0.02, 0.02, 0.001)),
+        (slice(8, 12), (0.001, 0.001, 1e-4, 1e-4, 1e-4, 1e-4)),
+    ):
+        away = np.abs(held - expected)[states].max(axis=0) / np.abs(expected[states]).max(axis=0)
+        assert (away < bars).all(), away
 
 
 @pytest.mark.parametrize("pitch", [0.0, 0.15])
