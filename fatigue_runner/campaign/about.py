@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,21 @@ def operating_curve(resolved: Resolved) -> dict[str, list[float]]:
         rows.append((float(wind), speed, pitch, power, float(turbine.rigid.thrust(wind, speed, pitch))))
     names = ("wind_speed", "rotor_speed", "blade_pitch", "generator_power", "rotor_thrust")
     return {name: [row[i] for row in rows] for i, name in enumerate(names)}
+
+
+def timed_evaluations(resolved: Resolved, earlier: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    """{`f` or the name of a corrector: {kind: processor seconds of one evaluation}}, as `results.evaluation_cost` takes them.
+
+    earlier: run.json of the run that goes on; its times are kept where nothing new is to be timed.
+    """
+    from fatigue_runner.integrators.evaluation_times import evaluation_times
+
+    integrators = [found.build() for found in resolved.integrations]
+    names = {"f", *(i.corrector_name for i in integrators if i.corrector is not None)}
+    kept = earlier.get("evaluation_times")
+    if isinstance(kept, dict) and names <= kept.keys():
+        return {name: kept[name] for name in kept if name in names}
+    return evaluation_times(resolved.ensemble(), integrators)
 
 
 def _processor() -> str:

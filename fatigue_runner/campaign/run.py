@@ -11,7 +11,14 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fatigue_runner.campaign.about import about, operating_curve, resolved_yaml, turbine_yaml, wind_words
+from fatigue_runner.campaign.about import (
+    about,
+    operating_curve,
+    resolved_yaml,
+    timed_evaluations,
+    turbine_yaml,
+    wind_words,
+)
 from fatigue_runner.campaign.block import Job, Setup, run_block
 from fatigue_runner.campaign.pieces import followed
 from fatigue_runner.campaign.plan import Plan, make_plan
@@ -160,6 +167,9 @@ def _simulate(
         "wind": wind_words(plan.resolved),
         "operating_curve": operating_curve(plan.resolved),
     }
+    if plan.campaign.delta_t:
+        progress.say("timing one evaluation of f and of every corrector")
+        about_run["evaluation_times"] = beside(lambda: timed_evaluations(plan.resolved, store.earlier))
     store.open(about_run, text)
     try:
         jobs = plan.jobs(store, setup, workers)

@@ -28,6 +28,8 @@ fatigue.damage            list of {place, curve, ...}: Miner's sum around the wa
 
 loads            more places than base and root: {tower_heights, blade_radii, root_directions}, see `campaign/loads_section.py`
 
+delta_t          whether one evaluation of f and of each corrector is timed, and the report tells the cost of arXiv:2504.05493
+                (`results/evaluation_cost.py`; default false)
 lifetime         the life that the cases stand for, from the site's wind: {climate, years, ...}, see `results/lifetime_section.py`
 
 log.enabled      one MCAP file per case in logs/ (default true)
@@ -271,6 +273,7 @@ class Campaign(Section):
     fatigue: Fatigue = Fatigue()
     log: Log = Log()
     loads: LoadsSection = LoadsSection()
+    delta_t: bool = False
     lifetime: LifetimeSection | None = None
 
     @property

@@ -343,6 +343,19 @@ def _correct(model, method, line, ring):
     keep_largest_distance(model, current, room.ahead, ring.largest)
 
 
+@njit(**INLINE)
+def learned_products(model, method, h, signals, ring):
+    """What a step multiplies with learned matrices: the rows that it sees, predictor and corrector."""
+    room, maps = method.room, method.maps
+    _predict(model, method, h, 0, signals, ring)
+    count = first_past_row(model) + part_size(model) * method.past
+    part_rows(model, room.ring, 0, room.turned, room.seen, count)
+    count += part_size(model)
+    if len(maps.factors) > 0:
+        multiply(count, maps.factors, room.seen)
+    dense_rows(room.seen, maps.weights, count * (1 + len(maps.factors)), rows(model), room.change)
+
+
 @njit(nogil=True, error_model="numpy", _nrt=False)
 def _set(fine, value):
     for j in range(LANES):

@@ -104,6 +104,9 @@ class Run:
 
     no_life: str = ""  # why there is none
     planned: int | None = None  # cases of the campaign, where the folder says so
+    evaluation_times: Mapping[
+        str, Mapping[str, float]
+    ] = {}  # see `results.evaluation_cost`; empty where not measured
 
     @property
     def missing(self) -> int:
@@ -172,16 +175,17 @@ def load_run(folder: Path) -> Run:
     """
     rows = read_results(folder)
     run = Run(folder, rows, *_read_settings(folder))
-    run.planned = _planned(folder)
+    planned, times = (_stored(folder, key) for key in ("cases", "evaluation_times"))
+    run.planned = planned if isinstance(planned, int) else None
+    run.evaluation_times = times if isinstance(times, Mapping) else {}
     return run
 
 
-def _planned(folder: Path) -> int | None:
+def _stored(folder: Path, key: str) -> Any:
     try:
-        found = json.loads((folder / "run.json").read_text(encoding="utf-8")).get("cases")
+        return json.loads((folder / "run.json").read_text(encoding="utf-8")).get(key)
     except (OSError, ValueError, AttributeError):
         return None
-    return found if isinstance(found, int) else None
 
 
 def _read_settings(

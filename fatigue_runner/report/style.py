@@ -160,9 +160,21 @@ def draw_legend(
         for s in shown
     ]
     # An entry takes its line and its gap (about 42 pt) and its glyphs; more than one row where they are too wide.
-    wide = sum(42.0 + 4.3 * len(str(entry.get_label())) for entry in entries)
-    ncols = math.ceil(len(entries) / math.ceil(wide / (72.0 * figure.get_figwidth())))
+    # A column is as wide as its widest entry.
+    widths, room = (
+        [42.0 + 4.3 * len(str(entry.get_label())) for entry in entries],
+        72.0 * figure.get_figwidth(),
+    )
+    ncols = math.ceil(len(entries) / math.ceil(sum(widths) / room))
+    while ncols > 1 and _columns_width(widths, ncols) > room:
+        ncols -= 1
     figure.legend(handles=entries, loc="outside upper center", ncols=ncols, handlelength=2.6)
+
+
+def _columns_width(widths: Sequence[float], ncols: int) -> float:
+    """Of a legend that fills one column after the other."""
+    rows = math.ceil(len(widths) / ncols)
+    return sum(max(widths[i : i + rows]) for i in range(0, len(widths), rows))
 
 
 def _dot(look: Look, summary: MethodSummary, dots: bool) -> dict[str, Any]:

@@ -111,6 +111,7 @@ def test_the_figures_are_drawn_and_the_measurements_are_plain_json(measured, tmp
     assert [p.name for p in paths] == [
         "paper-work-precision.png",
         "paper-boxes.png",
+        "paper-boxes-compiled.png",
         "paper-boxes-delta-e.png",
     ]
     assert all(p.read_bytes()[:4] == b"\x89PNG" for p in paths)

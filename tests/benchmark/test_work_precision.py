@@ -21,6 +21,7 @@ from fatigue_runner.campaign.spec import campaign_source
 from fatigue_runner.corrector import correctors
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import METHODS, Integrator
+from fatigue_runner.results.evaluation_cost import delta_ts
 
 SMALL = {
     "name": "small",
@@ -48,9 +49,13 @@ def result():
 def timed(result):
     """The same with times that were never measured: a microsecond per evaluation."""
     part = result["cases"][0]
+    part["evaluation_times"] = {
+        name: {"single": 1e-6, "lane": 1e-7} for name in ("f", *{p.corrector for p in part["points"]} - {""})
+    }
     for p in part["points"]:
         if not p.diverged:
             p.wall = {name: p.evaluations_per_second * 1e-6 for name in ("low", "median", "high")}
+            p.delta_t = delta_ts(part["evaluation_times"], p.evaluations_per_second, p.step, p.corrector)
     return result
 
 
@@ -228,6 +233,7 @@ def test_times_are_of_every_point_that_did_not_diverge_and_leave_the_errors_alon
     for p in parts[0]["points"]:
         assert bool(p.wall) != bool(p.diverged)
         assert p.diverged or 0 < p.wall["low"] <= p.wall["median"] <= p.wall["high"]
+        assert bool(p.delta_t) != bool(p.diverged)
     assert [p.nrmse_max for p in parts[0]["points"]] == before
 
 
@@ -246,6 +252,8 @@ def test_the_pages_hold_the_answers_the_tables_and_the_figures(timed, tmp_path):
     written = page.write(whole, tmp_path, tmp_path / "images").read_text(encoding="utf-8")
     part = timed["cases"][0]
     assert table(tables.verdicts(part, "wall")) in written
+    assert table(tables.verdicts(part, "delta_t")) in written
+    assert table(tables.evaluations(part["evaluation_times"])) in written
     assert "| NRMSE 1e-03 |" in written
     for line in written.splitlines():
         if line.startswith("!["):
@@ -263,7 +271,7 @@ def test_json_holds_every_point_with_plain_values(monkeypatch, tmp_path, timed):
     found = json.loads(file.read_text())["cases"][0]
     assert len(found["points"]) == len(timed["cases"][0]["points"])
     for p in found["points"]:
-        assert p["delta_t"] == p["wall"].get("median")
+        assert (set(p["delta_t"]) == {"single", "lane"}) == bool(p["wall"])
     assert found["summary"]["answers"][0]["target"] == "NRMSE 1e-02"
 
 

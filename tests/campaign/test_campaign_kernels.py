@@ -155,7 +155,15 @@ def test_the_paper_campaigns_have_the_papers_winds_steps_and_reference(name, bey
     assert {(c.integration.method, c.integration.step) for c in plan.cases if c.integration.is_reference} == {
         ("rk7", 1e-4)
     }
-    assert {c.integration.step for c in plan.cases if not c.integration.is_reference} == {0.01, 0.005}
+    others = [c.integration for c in plan.cases if not c.integration.is_reference]
+    assert {(i.method, i.step) for i in others if not i.corrector} == {
+        *((method, step) for method in ("heun", "rk3", "heun-richardson") for step in (0.01, 0.005)),
+        ("rk3", 0.015),  # costs what Heun does at 10 ms
+    }
+    assert {(i.step, i.mode) for i in others if i.corrector} == {
+        (step, mode) for step in (0.01, 0.005) for mode in ("enhanced", "hybrid")
+    }
+    assert len({i.corrector for i in others if i.corrector}) == 4  # network and affine map, each at its step
     assert (plan.campaign.turbine, plan.campaign.duration, plan.campaign.initial) == (
         "t2b1i1cg",
         20,

@@ -153,6 +153,25 @@ def test_the_run_folder_says_whose_it_is_and_can_be_run_again_from_its_own_campa
     assert again.rows == first.rows
 
 
+def test_evaluations_are_timed_where_a_campaign_asks_and_kept_when_it_goes_on(
+    world, tmp_path, out, monkeypatch
+):
+    timed = []
+
+    def evaluation_times(ensemble, integrators):
+        timed.append([i.method for i in integrators])
+        return {"f": {"single": 1e-6 * len(timed), "lane": 1e-7}}
+
+    monkeypatch.setattr("fatigue_runner.integrators.evaluation_times.evaluation_times", evaluation_times)
+    run_campaign(write_campaign(tmp_path), out)
+    assert timed == [] and "evaluation_times" not in json.loads((out / "run.json").read_text())
+    asked = write_campaign(tmp_path, delta_t=True)
+    for _ in range(2):
+        run_campaign(asked, out)
+        assert json.loads((out / "run.json").read_text())["evaluation_times"]["f"]["single"] == 1e-6
+    assert timed == [["rk7", "heun", "heun", "rk4"]]
+
+
 def test_finished_cases_are_not_run_again(world, campaign, out):
     first = run_campaign(campaign, out)
     calls = len(world.calls)

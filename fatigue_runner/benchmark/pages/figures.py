@@ -196,6 +196,9 @@ def write(results: Sequence[dict[str, Any]], folder: Path) -> list[str]:
         "work-precision-evaluations": lambda: error_over_cost(
             results, answers.evaluations, "evaluations of f per simulated second"
         ),
+        "work-precision-delta-t": lambda: error_over_cost(
+            results, _delta_t, "δt: µs of evaluations per simulated second and case"
+        ),
         "stability-limits": lambda: stability(results[0]["stability_limits"]),
     }
     for name, draw in made.items():
@@ -205,5 +208,12 @@ def write(results: Sequence[dict[str, Any]], folder: Path) -> list[str]:
 
 
 def _microseconds(point: Point) -> float | None:
-    median = point.wall.get("median")
-    return None if median is None else median * 1e6
+    return _scaled(answers.wall(point))
+
+
+def _delta_t(point: Point) -> float | None:
+    return _scaled(answers.delta_t(point))
+
+
+def _scaled(seconds: float | None) -> float | None:
+    return None if seconds is None else seconds * 1e6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from fatigue_runner.benchmark.study import answers
 from fatigue_runner.benchmark.study.answers import Answer, Reached
 from fatigue_runner.benchmark.study.points import Point
 from fatigue_runner.integrators import ENHANCED, HYBRID
+from fatigue_runner.results.evaluation_cost import KINDS, F
 
 
 def optional(value: float | None, text: str) -> str:
@@ -39,6 +40,7 @@ def _reached(r: Reached | None) -> str:
 _UNITS: dict[str, tuple[str, Callable[[Reached], str]]] = {
     "wall": ("µs/s", lambda r: _microseconds(r.wall)),
     "evaluations": ("per s", lambda r: f"{r.evaluations:.1f}"),
+    "delta_t": ("δt [µs/s]", lambda r: _microseconds(r.delta_t)),
 }
 
 
@@ -56,6 +58,16 @@ def verdicts(result: dict[str, Any], cost: str) -> Table:
 
 def _ratio(answer: Answer) -> str:
     return optional(answer.ratio, ".2f")
+
+
+def evaluations(times: Mapping[str, Mapping[str, float]]) -> Table:
+    """What one evaluation of f takes, and one of every corrector's N beside it."""
+    of_f, rows = times[F], []
+    for name, own in times.items():
+        ratio = "" if name == F else f"{own['lane'] / of_f['lane']:.2f}"
+        cells = [f"{own[kind] * 1e9:.0f}" for kind in ("lane", "single")]
+        rows.append(["f" if name == F else f"N of {name}", *cells, ratio])
+    return Table(["", *(f"{KINDS[kind]} [ns]" for kind in ("lane", "single")), "time(N) / time(f)"], rows)
 
 
 def fronts(result: dict[str, Any]) -> list[tuple[str, list[str]]]:
@@ -84,7 +96,7 @@ def duels(result: dict[str, Any]) -> Table:
         ])  # fmt: skip
     head = (
         *("corrector", "step [ms]", "NRMSE", "worst case", "DEL error", "µs/s", "evaluations/s"),
-        *("best classical at that NRMSE", "µs/s", "times cheaper: time", "evaluations", "accepted"),
+        *("best classical at that NRMSE", "µs/s", "times cheaper: time", "evaluations", "δt", "accepted"),
     )
     return Table(head, rows)
 
@@ -117,8 +129,17 @@ def _share(value: float | None) -> str:
 def points(found: Sequence[Point]) -> Table:
     """Costs and errors."""
     head = (
-        *("integrator", "step [ms]", "evaluations/s", "µs/s (delta_t)", "NRMSE", "worst case", "DEL error"),
-        *("delta_e", "delta_e_range"),
+        *(
+            "integrator",
+            "step [ms]",
+            "evaluations/s",
+            "µs/s",
+            "δt [µs/s]",
+            "δt, one case [µs/s]",
+            "NRMSE",
+            "worst case",
+        ),
+        *("DEL error", "delta_e", "delta_e_range"),
     )
     return Table(head, [_point(p) for p in found])
 
@@ -126,13 +147,13 @@ def points(found: Sequence[Point]) -> Table:
 def _point(p: Point) -> list[str]:
     cost = [p.label, f"{p.step * 1e3:g}", f"{p.evaluations_per_second:.0f}"]
     if p.diverged:
-        return [*cost, "", "", f"{p.diverged} diverged, first at {p.diverged_at:.1f} s", "", "", ""]
+        return [*cost, "", "", "", "", f"{p.diverged} diverged, first at {p.diverged_at:.1f} s", "", "", ""]
     time = ""
     if p.wall:
         time = f"{p.wall['median'] * 1e6:.2f} ({p.wall['low'] * 1e6:.2f} to {p.wall['high'] * 1e6:.2f})"
     median = [float(np.median(v)) for v in (p.delta_e, p.delta_e_range)]
     return [
-        *cost, time, optional(p.nrmse_max, ".1e"),
+        *cost, time, *(_microseconds(p.delta_t.get(kind)) for kind in ("lane", "single")), optional(p.nrmse_max, ".1e"),
         optional(p.nrmse_worst, ".1e"), optional(p.del_error_max, ".1e"), f"{median[0]:.1e}", f"{median[1]:.1e}",
     ]  # fmt: skip
 

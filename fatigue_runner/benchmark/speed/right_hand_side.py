@@ -6,6 +6,7 @@ Everything else here asks `simulate` and the turbine. Who changes the kernels' a
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Sequence
 from types import ModuleType
 from typing import Any
@@ -15,7 +16,7 @@ import numpy as np
 from fatigue_runner.compiled import INLINE, njit
 from fatigue_runner.integrators.signals import Signals, signals_at
 from fatigue_runner.turbine.generated import kernel, pitched
-from fatigue_runner.turbine.lane_code import LANES
+from fatigue_runner.turbine.lane_code import HEADER, LANES
 from fatigue_runner.turbine.lanes import aligned, counters, to_groups
 from fatigue_runner.turbine.model import rhs as rhs_of
 from fatigue_runner.wind import stack_cells
@@ -88,6 +89,38 @@ def arguments(
          np.zeros(lanes, np.int64))
         for x, p, u in zip(states, wind, controls, strict=True)
     ]  # fmt: skip
+
+
+def interpreted(turbine: Any) -> Callable[[Any, Any], list[float]]:
+    """(state, wind) -> slopes of one case at pitch 0, by the interpreter: the very lines that the compiled kernel is made of, and its
+    tables, in Python's own numbers."""
+    data = turbine.kernel_data(0.0)
+    code = data.model.generated.RHS_CODE
+    first, per_unit = (float(value) for value in data.tables[:2])
+    values = data.tables[HEADER:].reshape(-1, 4, code.width)[:, :, : len(code.tables)].tolist()
+    last = len(values) - 1
+
+    def look_up(place: float) -> list[float]:
+        at = (place - first) * per_unit
+        number = min(max(int(at), 0), last)
+        u = min(max(at - number, 0.0), 1.0)
+        one, two, three, four = values[number]
+        return [((d * u + c) * u + b) * u + a for a, b, c, d in zip(one, two, three, four, strict=True)]
+
+    lines = []
+    for line in code.text.splitlines():
+        lines.append(f"    {line}")
+        if line.startswith(f"{code.place} = "):
+            lines.append(f"    {', '.join(f'c_{name}' for name in code.tables)} = look_up({code.place})")
+    text = "\n".join(
+        ["def f(x, wind):", f"    out = [0.0] * {data.model.layout.size}", *lines, "    return out"]
+    )
+    space: dict[str, Any] = {
+        "floor": math.floor, "sqrt": math.sqrt, "look_up": look_up, "constants": data.constants.tolist(), "clamped": [0],
+    }  # fmt: skip
+    exec(compile(text, "<interpreted right-hand side>", "exec"), space)
+    found: Callable[[Any, Any], list[float]] = space["f"]
+    return found
 
 
 @njit(nogil=True)

@@ -37,6 +37,11 @@ def evaluations(point: Point) -> float | None:
     return point.evaluations_per_second
 
 
+def delta_t(point: Point) -> float | None:
+    """Per case of many."""
+    return point.delta_t.get("lane")
+
+
 def nrmse(point: Point) -> float | None:
     return point.nrmse_max
 
@@ -45,7 +50,7 @@ def del_error(point: Point) -> float | None:
     return point.del_error_max
 
 
-COSTS: dict[str, Cost] = {"wall": wall, "evaluations": evaluations}
+COSTS: dict[str, Cost] = {"wall": wall, "evaluations": evaluations, "delta_t": delta_t}
 LEVELS: tuple[tuple[str, Error, float], ...] = (
     *((f"NRMSE {level:.0e}", nrmse, level) for level in NRMSE_LEVELS),
     *((f"DEL error {level * 100:g} %", del_error, level) for level in DEL_LEVELS),
@@ -70,7 +75,8 @@ def front(points: Iterable[Point], cost: Cost, error: Error) -> list[Point]:
 
 @dataclass(frozen=True)
 class Reached:
-    """What an accuracy costs on one curve: time [s] (None where it was not measured) and evaluations per simulated second, step [s].
+    """What an accuracy costs on one curve: time and delta_t [s] (None where they were not measured), evaluations, all per simulated
+    second; step [s].
 
     between: the labels of the points that it was read between, or of the one that has it.
     """
@@ -79,6 +85,7 @@ class Reached:
     kind: str
     wall: float | None
     evaluations: float
+    delta_t: float | None
     step: float
     between: tuple[str, ...]
 
@@ -99,7 +106,13 @@ def reach(points: Sequence[Point], cost: Cost, error: Error, level: float) -> Re
     here = curve[i]
     if i == 0 or errors[i] <= 0.0 or _broken(points, error, curve[i - 1], here):
         return Reached(
-            here.series, here.kind, wall(here), here.evaluations_per_second, here.step, (here.label,)
+            here.series,
+            here.kind,
+            wall(here),
+            here.evaluations_per_second,
+            delta_t(here),
+            here.step,
+            (here.label,),
         )
     before = curve[i - 1]
     share = math.log(errors[i - 1] / level) / math.log(errors[i - 1] / errors[i])
@@ -110,7 +123,9 @@ def reach(points: Sequence[Point], cost: Cost, error: Error, level: float) -> Re
 
     rate, step = between(evaluations), between(lambda p: p.step)
     assert rate is not None and step is not None
-    return Reached(here.series, here.kind, between(wall), rate, step, (before.label, here.label))
+    return Reached(
+        here.series, here.kind, between(wall), rate, between(delta_t), step, (before.label, here.label)
+    )
 
 
 def _broken(points: Sequence[Point], error: Error, before: Point, after: Point) -> bool:

@@ -23,7 +23,8 @@ class Point:
     worst state; nrmse_worst: worst state of the worst case; del_error {channel: worst |relative error| over exponents and cases};
     delta_e, delta_e_range: one per case; accepted: share of a hybrid's output intervals. diverged: how many cases; diverged_at: the
     first time [s]. Nothing is known of the errors of a point with a diverged case. by_wind {mean speed [m/s] as text: fields of the
-    point as they are in this wind alone}, of a turbine that operates.
+    point as they are in this wind alone}, of a turbine that operates. wall: measured time of whole steps; delta_t {kind: what the
+    evaluations alone take, see `results.evaluation_cost`}.
     """
 
     cases: str
@@ -35,6 +36,7 @@ class Point:
     kind: str = CLASSICAL
     corrector: str = ""
     wall: dict[str, float] = field(default_factory=dict)
+    delta_t: dict[str, float] = field(default_factory=dict)
     diverged: int = 0
     diverged_at: float | None = None
     nrmse: dict[str, float] = field(default_factory=dict)
@@ -57,10 +59,10 @@ class Point:
 
     def at(self, wind: str) -> Point:
         """The point in one of `by_wind`; its time was not measured apart."""
-        return replace(self, wall={}, **self.by_wind[wind])
+        return replace(self, wall={}, delta_t={}, **self.by_wind[wind])
 
     def to_dict(self) -> dict[str, Any]:
-        return {"delta_t": self.wall.get("median"), **self.__dict__}
+        return dict(self.__dict__)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Point:

@@ -5,8 +5,8 @@ processes, since nothing is timed there. Times: whole steps with output, one pin
 a slow minute of the machine meets all of them; CPU time, which is the wall time of an idle machine. The stages can be run apart
 (`errors`, `times`), the second alone on a machine that is quiet for two minutes only.
 
-`delta_t`: the paper (arXiv:2504.05493) plots its errors over a time; its formula is not public text, so it is taken as the median
-time per simulated second [s/s].
+Beside the time stands delta_t, the cost of arXiv:2504.05493 (`results.evaluation_cost`): of the evaluations alone, from the times of
+one of f and one of each corrector, which are measured in the second stage, too.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ from fatigue_runner.benchmark.study.points import (
 )
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import Integrator
+from fatigue_runner.results.evaluation_cost import delta_ts
 
 Say = Callable[[str], None]
 
@@ -173,6 +174,7 @@ def _empty(cases: Cases, settings: Settings) -> dict[str, Any]:
         "points": [],
         "adaptive": [],
         "stability_limits": [],
+        "evaluation_times": {},
         "left_out": fitting(cases, settings)[1] + unresolved,
     }
 
@@ -193,11 +195,19 @@ def _sort(result: dict[str, Any]) -> None:
 def times(
     sets: Sequence[Cases], settings: Settings, results: Sequence[dict[str, Any]], rounds: int, say: Say
 ) -> None:
-    """Second stage: fills in `wall` of all points that did not diverge."""
+    """Second stage: fills in `wall` and `delta_t` of all points that did not diverge."""
+    from fatigue_runner.integrators.evaluation_times import evaluation_times
+
     with machine.pinned():
         for cases, result in zip(sets, results, strict=True):
             corrected = {i.label: i for i in fitting(cases, settings)[0] if i.corrector is not None}
             running = [p for p in result["points"] if not p.diverged]
+            say(f"{cases.name}: one evaluation of f, and of every corrector")
+            result["evaluation_times"] = evaluation_times(cases.ensemble, list(corrected.values()))
+            for p in running:
+                p.delta_t = delta_ts(
+                    result["evaluation_times"], p.evaluations_per_second, p.step, p.corrector
+                )
             work = []
             for p in running:
                 integrator = corrected[p.label] if p.corrector else Integrator(p.method, p.step)
