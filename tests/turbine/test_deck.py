@@ -408,3 +408,27 @@ def test_nothing_is_overwritten_unless_it_is_asked_for(imported):
     with pytest.raises(InputError, match="is there already; give another --out, or --overwrite"):
         import_deck(deck, made.turbine)
     assert made.turbine.read_bytes() == before
+
+
+@pytest.mark.slow(reason="makes aerodynamic tables")
+def test_a_machine_of_some_kilowatts_has_the_steady_rotation_of_a_large_one(tmp_path):
+    """The deck at a quarter of its size: in every wind it turns at the same tip-speed ratio but for gravity. A search that starts from a
+    large machine's deflections ends in some winds at a third of that, where its blades are stalled."""
+    s = 0.25
+    lengths = {"TipRad": 32.0, "HubRad": 2.0, "OverHang": -3.5, "NacCMxn": 1.0, "NacCMyn": -0.1, "NacCMzn": 1.0, "Twr2Shft": 1.5,
+               "TowerHt": 60.0}  # fmt: skip
+    others = {"HubMass": 9e3 * s**3, "NacMass": 4e4 * s**3, "YawBrMass": 1e3 * s**3, "HubIner": 2e4 * s**5, "GenIner": 60 * s**5,
+              "NacYIner": 4e5 * s**5, "DTTorSpr": 1e8 * s**3, "DTTorDmp": 1e6 * s**4}  # fmt: skip
+    deck = small.write(
+        tmp_path / "deck",
+        ElastoDyn=small.elastodyn(5, **{name: s * value for name, value in lengths.items()}, **others),
+        blade=small.blade(5, AdjBlMs=s**2, AdjFlSt=s**4, AdjEdSt=s**4),
+        tower=small.tower(AdjTwMa=s**2, AdjFASt=s**4, AdjSSSt=s**4),
+        AeroBlade=small.aero_blade(BlSpn=lambda a: 30 * s * a, BlChord=lambda a: s * (2.4 - 1.6 * a)),
+        ServoDyn=small.servodyn(VSContrl=0, PCMode=0),
+    )
+    turbine = load_turbine(import_deck(deck, tmp_path / "mine.yaml").turbine)
+    winds = np.array([5.0, 6.0, 8.0, 10.0, 12.0])
+    speeds = [turbine.operating_point(v)[turbine.layout.rotor_speed] for v in winds]
+    ratios = np.array(speeds) * turbine.rotor.radius / winds
+    assert np.ptp(ratios) < 0.01 * ratios.mean() and ratios.mean() > 6
