@@ -35,6 +35,7 @@ MOUNTED = {
     "turbine": "fatigue_runner.integrators.commands",
     "train": "fatigue_runner.corrector.train_command",
     "correctors": "fatigue_runner.corrector.commands",
+    "calibrate": "fatigue_runner.calibration.commands",
     "benchmark": "fatigue_runner.benchmark.commands",
     "version": "fatigue_runner.version_command",
 }

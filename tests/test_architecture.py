@@ -44,6 +44,7 @@ MAY_IMPORT = {
     "integrators": {"turbine", "wind"},
     "corrector": {"inputs", "turbine", "wind", "integrators"},
     "report": {"inputs", "fatigue", "logbook", "results"},
+    "calibration": {"inputs", "fatigue", "logbook", "results"},
     "viewer": {"inputs", "logbook", "turbine", "results"},
     "campaign": {
         "inputs",
@@ -95,6 +96,7 @@ ONLY_IN = {
         "report",
         "integrators",
         "corrector",
+        "calibration",
         "benchmark",
     },
 }
