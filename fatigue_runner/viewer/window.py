@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 HOST = "127.0.0.1"
 WEB_PORT = 9090
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
 _START_SECONDS = 20.0
 _WRITE_SECONDS = 300.0
 INSTALL = "pip install 'rerun-sdk>=0.41,<0.42'"
@@ -130,7 +133,8 @@ SILENT = {"CI": "1"}
 def start_viewer(*arguments: str | Path, own_session: bool = True) -> subprocess.Popen[bytes]:
     """Start the viewer's program itself: the `rerun` script is a wrapper, and stopping that leaves the viewer alone.
 
-    own_session: keep it from the Ctrl-C of this terminal.
+    own_session: keep it from the Ctrl-C of this terminal, and let it end with this process, whatever ends that. Without it the viewer
+    stays open.
     """
     command = [str(program()), "--bind", HOST, "--hide-welcome-screen", *map(str, arguments)]
     return subprocess.Popen(
@@ -140,7 +144,24 @@ def start_viewer(*arguments: str | Path, own_session: bool = True) -> subprocess
         stderr=subprocess.DEVNULL,
         env={**os.environ, **SILENT},
         start_new_session=own_session,
+        preexec_fn=_ends_with_its_parent() if own_session else None,
     )
+
+
+def _ends_with_its_parent() -> Callable[[], None] | None:
+    """What a new process does first, so that Linux ends it with this one; None on other systems."""
+    try:
+        libc, parent = ctypes.CDLL(None), os.getpid()
+        libc.prctl  # noqa: B018  (looked up here: between fork and exec nothing should be)
+    except (OSError, TypeError, AttributeError):
+        return None
+
+    def ask() -> None:
+        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:  # it has gone meanwhile
+            os._exit(1)
+
+    return ask
 
 
 def end(process: subprocess.Popen[bytes]) -> None:

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -291,3 +292,31 @@ def sent(path: Path, cuts: tuple[int, ...] = (), **stage_of: Any) -> dict[str, i
     for first, last in zip((0, *cuts), (*cuts, None), strict=True):
         stage.send(viewed[0], first, last)
     return {name.replace(f"/{viewed[0].key}", ""): rows for name, rows in counter.rows.items()}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="Linux ends a process with its parent")
+def test_a_viewer_ends_when_the_program_that_opened_it_is_killed():
+    pytest.importorskip("rerun_cli", reason="the viewer is not installed")
+    start = (
+        "from fatigue_runner.viewer import window\n"
+        "with window.viewer('--serve-grpc', '--port', str(window.free_port())) as process:\n"
+        "    print(process.pid, flush=True)\n"
+        "    process.wait()\n"
+    )
+    with subprocess.Popen([sys.executable, "-c", start], stdout=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        viewer = Path(f"/proc/{int(program.stdout.readline())}")
+        assert alive(viewer)
+        program.kill()
+    until = time.monotonic() + 2.0
+    while alive(viewer) and time.monotonic() < until:
+        time.sleep(0.02)
+    assert not alive(viewer)
+
+
+def alive(process: Path) -> bool:
+    """Whether a process of this folder of /proc still does something."""
+    try:
+        return " Z " not in (process / "stat").read_text()
+    except OSError:
+        return False
