@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import sysconfig
+import tarfile
 import tomllib
 import venv
 from pathlib import Path
@@ -57,6 +58,33 @@ def wheel(tmp_path_factory) -> Path:
     subprocess.run([*build, "-w", str(folder), str(ROOT)], check=True)
     (made,) = folder.glob("*.whl")
     return made
+
+
+def test_a_source_distribution_carries_all_that_the_project_is_made_and_tested_of(tmp_path):
+    pytest.importorskip("hatchling", reason="hatchling is not installed")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)], cwd=ROOT, check=True
+    )
+    (made,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(made) as archive:
+        carried = {name.partition("/")[2] for name in archive.getnames()}
+    kept = {
+        path.relative_to(ROOT).as_posix()
+        for folder in ("fatigue_runner", "campaigns", "correctors", "tests", "tools", "docs", ".ci")
+        for path in (ROOT / folder).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    top = {
+        "pyproject.toml",
+        "README.md",
+        "LICENSE",
+        "CHANGELOG.md",
+        "CITATION.cff",
+        "constraints.txt",
+        "PKG-INFO",
+    }
+    assert kept | top <= carried
+    assert not {name for name in carried if name.startswith(("runs/", "site/", ".git/", "dist/"))}
 
 
 @pytest.mark.slow(reason="builds a wheel")
