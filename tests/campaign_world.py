@@ -75,7 +75,7 @@ def build_world(monkeypatch: Any) -> World:
 
     # the toy's reference is exact, and its calls are counted
     monkeypatch.setattr(run, "reference_facts", lambda plan, earlier: {})
-    monkeypatch.setattr(run, "_warm_up", lambda plan, jobs: None)
+    monkeypatch.setattr(run, "warm_up", lambda job: None)
     block._turbine.cache_clear()
     monkeypatch.setattr(block, "_turbine", lambda source, expected_hash, operation: turbine)
     return world

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -95,6 +96,31 @@ def run_block(job: Job) -> list[dict[str, Any]]:
                 with suppress(OSError):
                     leave(job.setup.logs.parent, job.cases[0].id, record)
     return records
+
+
+def warm_up(job: Job) -> None:
+    """Compile what a job needs, here: two steps of each of its methods, under each kind of its winds, and the counting of cycles."""
+    from fatigue_runner.fatigue import count_channels
+
+    setup = job.setup
+    campaign = setup.campaign
+    count_channels({"": [0.0, 1.0, 0.0, 1.0]}, campaign.fatigue.wohler_exponents, 1.0)
+    turbine = _turbine(setup.turbine, setup.turbine_hash, campaign.operation)
+    done = set()
+    for case in (*job.references, *job.cases):
+        found = case.integration
+        outputs = 1 + math.ceil(2 * found.step * campaign.output_rate)
+        short = dataclasses.replace(
+            setup, campaign=campaign.model_copy(update={"duration": outputs / campaign.output_rate})
+        )
+        try:
+            wind = case.wind.build(turbine.rotor)
+            kind = found.method, found.corrector, found.mode, turbine.layout.beyond(wind.channels)
+            if kind not in done:
+                done.add(kind)
+                simulate(short, found, [wind], job.initial[case.wind.id][None])
+        except FatigueRunnerError:
+            continue  # what is wrong shows when the cases run
 
 
 def with_sections(setup: Setup, trajectory: Trajectory) -> Trajectory:

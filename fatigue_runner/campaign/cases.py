@@ -44,23 +44,24 @@ def make_cases(resolved: Resolved) -> list[Case]:
     evaluation["walls"] = {
         place: [wall.circle.diameter, wall.circle.wall] for place, wall in resolved.walls.items()
     }
+    shared = {
+        "code": code_hash(),
+        "turbine": resolved.turbine.hash,
+        "watched": resolved.turbine.watched,
+        **common,
+    }
+    of_all, of_evaluation = hashlib.sha256(_text(shared)), hashlib.sha256(_text(evaluation))
+    integrations = [(found, _text(found.identity)) for found in resolved.integrations]
     cases = []
     for wind in resolved.winds:
-        reference_hash = ""
-        for integration in resolved.integrations:
+        reference_hash, of_wind = "", _more(of_all, _text(wind.named.identity))
+        for integration, identity in integrations:
             case_id = joined(wind.named.id, integration.id)
-            simulation = {
-                "code": code_hash(),
-                "turbine": resolved.turbine.hash,
-                "watched": resolved.turbine.watched,
-                "wind": wind.named.identity,
-                "integration": integration.identity,
-                **common,
-            }
-            simulation_hash = _digest(simulation)
+            simulation_hash = _more(of_wind, identity).hexdigest()
             reference_hash = simulation_hash if integration.is_reference else reference_hash
-            record = [simulation_hash, reference_hash, integration.is_reference, evaluation, case_id]
-            cases.append(Case(case_id, wind.named, integration, simulation_hash, _digest(record)))
+            record = [simulation_hash, reference_hash, integration.is_reference, case_id]
+            whole = _more(of_evaluation, _text(record)).hexdigest()
+            cases.append(Case(case_id, wind.named, integration, simulation_hash, whole))
     _refuse_same_names(cases)
     _refuse_long_names(cases)
     return cases
@@ -110,5 +111,12 @@ def blocks(items: Sequence[Any], keys: Sequence[Any], size: int, workers: int) -
     return result
 
 
-def _digest(value: Any) -> str:
-    return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+def _text(value: Any) -> bytes:
+    return json.dumps(value, sort_keys=True, separators=(",", ":")).encode() + b"\n"
+
+
+def _more(begun: Any, text: bytes) -> Any:
+    """A hash that was begun, gone on with; what many cases share is hashed once."""
+    found = begun.copy()
+    found.update(text)
+    return found

@@ -113,7 +113,9 @@ def _check(integration: Integration, resolved: Resolved) -> None:
 
     built = integration.build()
     try:
-        for wind in resolved.winds:
+        # seeds differ in nothing that a step must resolve
+        alike = {(w.source.harmonics, w.source.mean_speed, id(w.initial)): w for w in resolved.winds}
+        for wind in alike.values():
             refuse_unresolved(resolved.turbine, wind.source, wind.initial, integration.step)
     except InputError as error:
         raise _Refused(str(error), "step") from None

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner.results.records import to_line, whole_records
+from fatigue_runner.results.records import head_of, to_line
 
 FOLDER = "finished"  # in the run folder, while cases run
 EVERY = 0.5  # s between two looks
@@ -34,15 +34,15 @@ class Pieces:
         self._folder = folder / FOLDER
         self._read: dict[str, int] = {}
 
-    def new(self) -> list[dict[str, Any]]:
-        """The records that were left since the last call; a line that is not whole yet is left for later."""
+    def new(self) -> list[bytes]:
+        """The lines of the records that were left since the last call; one that is not whole yet is left for later."""
         found = []
         for path in sorted(self._folder.glob("*.jsonl")):
             with path.open("rb") as file:
                 file.seek(self._read.get(path.name, 0))
                 whole, newline, _ = file.read().rpartition(b"\n")
             self._read[path.name] = self._read.get(path.name, 0) + len(whole) + len(newline)
-            found += whole_records(whole + newline)[0]
+            found += [line + b"\n" for line in whole.split(b"\n") if head_of(line)]
         return found
 
     def clear(self) -> None:

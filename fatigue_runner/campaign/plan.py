@@ -93,7 +93,7 @@ class Plan:
         for case in self.cases:
             if case.integration.is_reference:
                 references[case.wind.id] = case
-            if store.finished(case, self.campaign.log.enabled) is None:
+            if not store.finished(case, self.campaign.log.enabled):
                 pending.setdefault(case.wind.id, []).append(case)
         layout, sources = self.resolved.turbine.layout, [self.winds[wind].source for wind in pending]
         keys = [(source.cell_key, layout.wind_size(source.channels)) for source in sources]

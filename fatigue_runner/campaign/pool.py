@@ -13,7 +13,7 @@ from concurrent.futures import BrokenExecutor, CancelledError
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from typing import Any, TypeVar
 
-from fatigue_runner.errors import FatigueRunnerError, InputError
+from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.interruption import ENDING
 
 T = TypeVar("T")
@@ -24,20 +24,6 @@ WATCH = 0.5  # s between two looks of a worker for its parent
 
 class WorkerEndedError(FatigueRunnerError):
     """A worker is gone; what it was doing must be done again."""
-
-
-def connect(dask: str) -> None:
-    """Connect to a dask scheduler, `tcp://host:8786`. Raises InputError where none answers, or without the package."""
-    try:
-        import distributed
-    except ImportError:
-        raise InputError("--dask needs the package `distributed`: pip install distributed") from None
-    try:
-        distributed.Client(dask, timeout=10, set_as_default=True)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"no dask scheduler answers at {dask} ({error}); start one with `dask scheduler`"
-        ) from None
 
 
 def run_jobs(
@@ -60,7 +46,7 @@ def _run_in_processes(
 ) -> Iterator[T]:
     import joblib
 
-    with _backend(joblib, workers, dask):
+    with _backend(joblib, workers, dask), cluster_errors(dask):
         parallel = joblib.Parallel(batch_size=1, return_as="generator_unordered")
         with _born_deaf():
             results = parallel(joblib.delayed(_guarded)(function, job) for job in jobs)
@@ -70,15 +56,22 @@ def _run_in_processes(
             raise WorkerEndedError(
                 "a worker process was ended from outside, most likely by the system for want of memory"
             ) from error
-        except Exception as error:
-            if dask is None or not _of_the_cluster(error):
-                raise
-            raise WorkerEndedError(
-                f"the dask scheduler at {dask} is lost ({type(error).__name__})"
-            ) from error
         finally:
             with suppress(Exception) if dask is not None else nullcontext():
                 results.close()
+
+
+@contextmanager
+def cluster_errors(dask: str | None) -> Iterator[None]:
+    """Raises WorkerEndedError for what a dask cluster says of itself, not of a job."""
+    try:
+        yield
+    except Exception as error:
+        if dask is None or not _of_the_cluster(error):
+            raise
+        raise WorkerEndedError(
+            f"the dask scheduler at {dask} or its workers are lost ({type(error).__name__})"
+        ) from error
 
 
 def _of_the_cluster(error: Exception) -> bool:

@@ -10,8 +10,12 @@ import ast
 import functools
 import hashlib
 import re
+import zlib
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
+
+from fatigue_runner.inputs.files import write_atomically
 
 PACKAGE = "fatigue_runner"
 _MADE_NAME = re.compile(rb"import_module\(f\"\{__package__\}\.(\w+)\.")
@@ -23,10 +27,47 @@ LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 @functools.cache
 def code_hash() -> str:
     """Hash of all that computes, so that figures of two versions never stand in one table."""
+    known = _remembered()
+    if known is not None:
+        return known
     digest = hashlib.sha256(source_hash(Path(__file__).parents[1]).encode())
     for name in LIBRARIES:
         digest.update(f"{name} {metadata.version(name)}\n".encode())
+    found = digest.hexdigest()[:16]
+    with suppress(OSError):  # half a second at the start of every run otherwise
+        write_atomically(_memory(), _checked(found))
+    return found
+
+
+def program_hash() -> str:
+    """Hash of the whole program and of the libraries that compute: whatever it writes it would write again."""
+    root = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for file in sorted(path for path in root.rglob("*") if path.suffix in (".py", ".html", ".css", ".js")):
+        digest.update(f"{file.relative_to(root).as_posix()}\n".encode() + file.read_bytes())
+    for name in LIBRARIES:
+        digest.update(f"{name} {metadata.version(name)}\n".encode())
     return digest.hexdigest()[:16]
+
+
+def _memory() -> Path:
+    from fatigue_runner import compiled
+
+    return compiled.cache_folder() / f"code-{program_hash()}"
+
+
+def _remembered() -> str | None:
+    """The code's hash, where an earlier run of this very program has found it."""
+    try:
+        text = _memory().read_bytes()
+    except OSError:
+        return None
+    found = text.partition(b" ")[0].decode("ascii", "replace")
+    return found if text == _checked(found) else None
+
+
+def _checked(found: str) -> bytes:
+    return f"{found} {zlib.crc32(found.encode()):08x}\n".encode()
 
 
 def source_hash(root: Path) -> str:

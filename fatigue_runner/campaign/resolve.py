@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -196,13 +197,13 @@ def _winds(
     from fatigue_runner.turbine.envelope import check_wind
 
     place = Place(source, ("wind",))
-    winds, starts = [], _Starts(campaign, turbine, pitch)
+    winds, starts, told_of = [], _Starts(campaign, turbine, pitch), cache(partial(check_wind, turbine))
     site = Site(turbine.rotor, campaign.duration, place)
     for named in realisations(campaign, site, integrations, source):
         where = place.where(*named.path)
         blowing = _blowing(named, turbine.rotor, campaign.duration, where)
         try:
-            told = check_wind(turbine, blowing.mean_speed)
+            told = told_of(blowing.mean_speed)
             notes = (*blowing.notes, *([f"{where}: {told}"] if told else []))
             winds.append(ResolvedWind(named, blowing, starts.of(blowing), notes))
         except InputError as error:

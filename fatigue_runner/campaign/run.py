@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import errno
-import math
 import shutil
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from fatigue_runner.campaign.about import (
     about,
@@ -19,16 +20,19 @@ from fatigue_runner.campaign.about import (
     turbine_yaml,
     wind_words,
 )
-from fatigue_runner.campaign.block import Job, Setup, run_block
+from fatigue_runner.campaign.block import Job, Setup, run_block, warm_up
+from fatigue_runner.campaign.cases import Case
+from fatigue_runner.campaign.cluster import Cluster
+from fatigue_runner.campaign.parcel import pack
 from fatigue_runner.campaign.pieces import followed
 from fatigue_runner.campaign.plan import Plan, make_plan
-from fatigue_runner.campaign.pool import WorkerEndedError, beside, connect, dismiss_workers, run_jobs
+from fatigue_runner.campaign.pool import WorkerEndedError, beside, dismiss_workers, run_jobs
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.campaign.trust import reference_facts
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.interruption import end_if_asked, exit_code_of
 from fatigue_runner.results.beyond import beyond
-from fatigue_runner.results.table import Results
+from fatigue_runner.results.table import Results, read_rows
 from fatigue_runner.turbine.rated import rated_rotor_speed
 
 if TYPE_CHECKING:
@@ -111,25 +115,34 @@ def _run_campaign(
             progress.note(sentence)
         folder = out if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh, [column.name for column in plan.columns])
-        if dask is not None:
-            connect(dask)
-        simulated = _simulate(plan, store, workers or plan.campaign.workers, dask, progress, watch)
-        results = _collect(plan, store, simulated)
-        results.write()
+        with nullcontext() if dask is None else Cluster(dask) as cluster:
+            simulated = _simulate(plan, store, workers or plan.campaign.workers, cluster, progress, watch)
+        settled = not simulated and store.settled
+        results = _collect(plan, store, simulated, settled)
         if plan.campaign.lifetime is not None:
             from fatigue_runner.results.lifetime import life_of
 
             results.life = life_of(results.rows, plan.campaign.lifetime)
-            results.life.write(results.out)
-        progress.say("writing the report")
-        end_if_asked()
-        try:
-            _write_report(results)
-        except KeyboardInterrupt:
-            dismiss_workers()
-            raise
+        if not settled:
+            _write(results, store, progress)
     results.wall_time = time.perf_counter() - started
     return results
+
+
+def _write(results: Results, store: Store, progress: Any) -> None:
+    """Write the tables and the report; that they are there is remembered, so that nobody makes them again."""
+    results.write()
+    if results.life is not None:
+        results.life.write(results.out)
+    progress.say("writing the report")
+    end_if_asked()
+    try:
+        _write_report(results)
+    except KeyboardInterrupt:
+        dismiss_workers()
+        raise
+    if not results.report_error:
+        store.settle()
 
 
 def _write_report(results: Results) -> None:
@@ -143,7 +156,7 @@ def _write_report(results: Results) -> None:
 
 
 def _simulate(
-    plan: Plan, store: Store, workers: int, dask: str | None, progress: Any, watch: Watch | None = None
+    plan: Plan, store: Store, workers: int, cluster: Cluster | None, progress: Any, watch: Watch | None = None
 ) -> int:
     """Run the cases that are not finished; returns how many there were."""
     progress.say("checking the reference")
@@ -175,20 +188,21 @@ def _simulate(
         jobs = plan.jobs(store, setup, workers)
         pending = sum(len(job.cases) for job in jobs)
         progress.begin(len(plan.cases), len(plan.cases) - pending)
-        if jobs:
-            beside(lambda: _warm_up(plan, jobs))
-        progress.say("running")
-        ids = [[case.id for case in job.cases] for job in jobs]
-        for sentence in _before(plan, store, pending):
-            progress.note(sentence)
-        watched = watch(store.out, len(plan.cases), ids, workers) if watch else nullcontext()
-        with watched, followed(lambda: progress.advance(store.take_in())):
-            try:
-                _run(jobs, workers, dask, store, progress)
-            except WorkerEndedError as error:
-                progress.note(f"{error}; what it was doing is tried once more")
-                progress.advance(store.take_in())
-                _run(plan.jobs(store, setup, workers), workers, dask, store, progress)
+        with _ready(plan, jobs, cluster) as run:
+            progress.say("running")
+            ids = [[case.id for case in job.cases] for job in jobs]
+            for sentence in _before(plan, store, pending):
+                progress.note(sentence)
+            watched = watch(store.out, len(plan.cases), ids, workers) if watch else nullcontext()
+            with watched, followed(lambda: progress.advance(store.take_in())):
+                try:
+                    _run(run, jobs, workers, cluster, store, progress)
+                except WorkerEndedError as error:
+                    if cluster is not None:  # which gives the work of a dead worker to another by itself
+                        raise
+                    progress.note(f"{error}; what it was doing is tried once more")
+                    progress.advance(store.take_in())
+                    _run_again(error, plan.jobs(store, setup, workers), workers, store, progress)
         return pending
     except KeyboardInterrupt as interrupt:
         dismiss_workers()
@@ -198,40 +212,62 @@ def _simulate(
             exit_code_of(interrupt),
         ) from None
     except WorkerEndedError as error:
+        store.take_in()
+        way_out = (
+            "with fewer --workers, which takes less memory" if cluster is None else "once the cluster is back"
+        )
         raise FatigueRunnerError(
-            f"{error}, and so did the one that tried it again; {_finished(plan, store)} are finished and kept, the same command runs the "
-            "rest (with fewer --workers, which takes less memory)"
+            f"{error}; {_finished(plan, store)} are finished and kept, the same command runs the rest ({way_out})"
         ) from None
     finally:
         store.close()
 
 
-def _run(jobs: Sequence[Job], workers: int, dask: str | None, store: Store, progress: Any) -> None:
-    for records in run_jobs(run_block, jobs, workers, dask):
+def _run(
+    run: Callable[[Job], Any],
+    jobs: Sequence[Job],
+    workers: int,
+    cluster: Cluster | None,
+    store: Store,
+    progress: Any,
+) -> None:
+    for records in run_jobs(run, jobs, workers, None if cluster is None else cluster.address):
         progress.advance(store.add(records))
         end_if_asked()
 
 
-def _warm_up(plan: Plan, jobs: Sequence[Job]) -> None:
-    """Compile what the pending cases need, here and once, so that the workers load it from the cache: a few steps of every method."""
-    from fatigue_runner import integrators
-    from fatigue_runner.fatigue import count_channels
+def _run_again(
+    first: WorkerEndedError, jobs: Sequence[Job], workers: int, store: Store, progress: Any
+) -> None:
+    try:
+        _run(run_block, jobs, workers, None, store, progress)
+    except WorkerEndedError:
+        raise WorkerEndedError(f"{first}, and so did the one that tried it again") from None
 
-    count_channels({"": [0.0, 1.0, 0.0, 1.0]}, plan.campaign.fatigue.wohler_exponents, 1.0)
-    pending = [case.integration for job in jobs for case in (*job.references, *job.cases)]
-    methods = {(found.method, found.corrector, found.mode): found for found in pending}
-    layout = plan.resolved.turbine.layout
-    winds = {layout.beyond(wind.source.channels): wind for wind in plan.resolved.winds}
-    for found in methods.values():
-        outputs = 1 + math.ceil(2 * found.step * plan.campaign.output_rate)
-        for wind in winds.values():
-            try:
-                short = plan.resolved.ensemble(
-                    [wind], min(outputs / plan.campaign.output_rate, plan.campaign.duration)
-                )
-                integrators.simulate(short, found.build())
-            except FatigueRunnerError:
-                continue  # what is wrong shows when the cases run
+
+def _sample(jobs: Sequence[Job]) -> Job:
+    """A job that needs every kernel which any of them needs: one case of each kind."""
+    kinds: dict[Any, tuple[Case, np.ndarray]] = {}
+    for job in jobs:
+        for case in (*job.references, *job.cases):
+            method, wind = case.integration, case.wind
+            key = method.method, method.corrector, method.mode, wind.kind, bool(wind.tower), any(wind.angles)
+            kinds.setdefault(key, (case, job.initial[wind.id]))
+    initial = {case.wind.id: state for case, state in kinds.values()}
+    return Job(jobs[0].setup, [case for case, _ in kinds.values()], [], initial, set())
+
+
+@contextmanager
+def _ready(plan: Plan, jobs: Sequence[Job], cluster: Cluster | None) -> Iterator[Callable[[Job], Any]]:
+    """What runs a job; its kernels are compiled, where it will run, once."""
+    if not jobs:
+        yield run_block
+    elif cluster is None:
+        beside(lambda: warm_up(_sample(jobs)))
+        yield run_block
+    else:
+        with cluster.prepared(pack(plan.resolved), _sample(jobs)) as on_worker:
+            yield on_worker
 
 
 def _before(plan: Plan, store: Store, pending: int) -> list[str]:
@@ -260,12 +296,12 @@ def _before(plan: Plan, store: Store, pending: int) -> list[str]:
 
 
 def _finished(plan: Plan, store: Store) -> str:
-    done = sum(store.finished(case, plan.campaign.log.enabled) is not None for case in plan.cases)
+    done = sum(store.finished(case, plan.campaign.log.enabled) for case in plan.cases)
     return f"{done} of {len(plan.cases)} cases"
 
 
-def _collect(plan: Plan, store: Store, simulated: int) -> Results:
-    rows = [store.records[case.id]["row"] for case in plan.cases]
+def _collect(plan: Plan, store: Store, simulated: int, settled: bool) -> Results:
+    rows = read_rows(store.out) if settled else store.rows(plan.cases)
     return Results(
         out=store.out,
         columns=[column.name for column in plan.columns],

@@ -16,22 +16,34 @@ import errno
 import json
 import os
 import threading
-from collections.abc import Callable, Collection, Iterable
+import zlib
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.pieces import FOLDER, Pieces
-from fatigue_runner.errors import InputError
+from fatigue_runner.campaign.provenance import program_hash
+from fatigue_runner.errors import FatigueRunnerError, InputError
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.naming import LONGEST_NAME
-from fatigue_runner.results.records import to_line, whole_records
+from fatigue_runner.results.records import Head, from_line, head_of, lines_of, to_line
+from fatigue_runner.results.rows import Rows
 
 # What all cases of a folder have in common. Where it differs, no finished case could be kept.
 _IDENTITY = ("name", "code", "turbine_hash", "duration", "output_rate", "initial", "pitch")
 _RESULTS = ("results.csv", "columns.csv", "results.parquet", "lifetime.csv", "damage.csv", "report.html")
 _OWN = {"campaign.yaml", "run.json", "cases.jsonl", FOLDER, "logs", *_RESULTS}
+MADE = "results"  # entry of run.json: what the results were made of, and what they were then
+
+
+class Kept(NamedTuple):
+    """The last record of a case without its row, which stays in cases.jsonl: `size` bytes from `place` on."""
+
+    head: Head
+    place: int
+    size: int
 
 
 class Store:
@@ -45,7 +57,7 @@ class Store:
         self, out: Path, identity: dict[str, Any], fresh: bool = False, columns: Collection[str] = ()
     ) -> None:
         self.out = out
-        self._columns = set(columns)
+        self._columns = list(columns)
         self.damaged = 0  # lines of cases.jsonl that are not as they were written
         self._checked: dict[str, tuple[int, int]] = {}  # size and time of logs whose content was checked
         self.identity = {key: identity[key] for key in _IDENTITY}
@@ -54,33 +66,76 @@ class Store:
         self.earlier: dict[str, Any] = {}  # run.json of the run that goes on
         self._check_folder()
         self._pieces, self._adding = Pieces(out), threading.Lock()
-        self.records = {} if fresh else self._read_records()
+        self._about: dict[str, Any] = {}
+        self._seen: tuple[int, int] | None = None  # size and time of the journal that was read
+        self._kept: dict[str, Kept] = {} if fresh else self._read_journal()
 
     def log_path(self, case_id: str) -> Path:
         """Where the log of a case lies."""
         return self.out / "logs" / f"{case_id}.mcap"
 
-    def finished(self, case: Case, logged: bool) -> dict[str, Any] | None:
-        """The record of a case that need not run again; None where it must."""
-        record = self.records.get(case.id)
-        if record is None or record["hash"] != case.hash or record["row"]["status"] == "failed":
-            return None
-        if not self._columns <= record["row"].keys():
-            return None
-        return record if not logged or self._log_complete(record) else None
+    def finished(self, case: Case, logged: bool) -> bool:
+        """Whether a case need not run again."""
+        kept = self._kept.get(case.id)
+        if kept is None or kept.head.record["hash"] != case.hash or kept.head.status == "failed":
+            return False
+        if kept.head.columns < len(self._columns):
+            return False
+        return not logged or self._log_complete(kept.head)
 
     def logged(self, case: Case) -> bool:
         """Whether a complete log holds exactly the trajectory of this case."""
-        record = self.records.get(case.id)
-        if record is None or record["simulation_hash"] != case.simulation_hash:
+        kept = self._kept.get(case.id)
+        if kept is None or kept.head.record["simulation_hash"] != case.simulation_hash:
             return False
-        return self._log_complete(record)
+        return self._log_complete(kept.head)
+
+    def rows(self, cases: Iterable[Case]) -> Rows:
+        """The rows of finished cases, in their order, from cases.jsonl."""
+        return Rows(self._columns, self._rows_of(cases))
+
+    def _rows_of(self, cases: Iterable[Case]) -> Iterator[dict[str, Any]]:
+        with self._journal_path.open("rb") as journal:
+            for case in cases:
+                kept = self._kept[case.id]
+                journal.seek(kept.place)
+                row = (from_line(journal.read(kept.size).rstrip(b"\n")) or {}).get("row", {})
+                if not row.keys() >= set(self._columns):
+                    raise FatigueRunnerError(
+                        f"{self._journal_path}: the record of {case.id} is damaged; delete its line, and the same command runs the case "
+                        "again"
+                    )
+                yield row
+
+    @property
+    def settled(self) -> bool:
+        """Whether the results in the folder are those of its records, made by this program: nobody need make them again."""
+        return bool(self.earlier) and self.earlier.get(MADE) == self._made()
+
+    def settle(self) -> None:
+        """Remember what the results were made of. The store may be closed already."""
+        write_atomically(self.out / "run.json", _as_json(self._about | {MADE: self._made()}))
+
+    def _made(self) -> dict[str, Any]:
+        """Checksums of what decides the results, and of the results."""
+        from fatigue_runner.logbook import checksum
+
+        files = [path for name in ("cases.jsonl", *_RESULTS) if (path := self.out / name).exists()]
+        return {
+            "program": program_hash(),
+            "run.json": zlib.crc32(_as_json(self._about)),
+            **{path.name: checksum(path) for path in files},
+        }
+
+    @property
+    def _journal_path(self) -> Path:
+        return self.out / "cases.jsonl"
 
     def open(self, run: dict[str, Any], campaign_text: str) -> None:
         """Create the folder, lock it against a second run, say whose it is. Raises InputError if locked."""
         try:
             (self.out / "logs").mkdir(parents=True, exist_ok=True)
-            self._journal = (self.out / "cases.jsonl").open("ab")
+            self._journal = self._journal_path.open("ab")
         except OSError as error:
             raise InputError(
                 f"{self.out}: cannot be written ({error.strerror}); choose another --out"
@@ -96,7 +151,8 @@ class Store:
     def _take_over(self, run: dict[str, Any], campaign_text: str) -> None:
         assert self._journal is not None
         self._check_folder()  # a run that held the lock until now may have been another campaign's
-        self.records = {} if self._fresh else self._read_records()
+        if not self._fresh and self._seen != self._state():
+            self._kept = self._read_journal()
         if self._fresh:
             self._clear()
             self._pieces.clear()
@@ -105,29 +161,35 @@ class Store:
         self.take_in()  # what a run that was killed had finished of its blocks
         self._pieces.clear()
         write_atomically(self.out / "campaign.yaml", campaign_text.encode())
-        write_atomically(self.out / "run.json", json.dumps(self.identity | run, indent=1).encode())
+        self._about = self.identity | run
+        made = {MADE: self.earlier[MADE]} if MADE in self.earlier else {}
+        write_atomically(self.out / "run.json", _as_json(self._about | made))
 
     def add(self, records: Iterable[dict[str, Any]]) -> int:
         """Append the records of finished cases; they survive whatever happens next. Returns how many were not there yet."""
-        # as they are when they are read again, so that the same record is the same whichever way it came
-        return self._add_new(lambda: [json.loads(json.dumps(record, allow_nan=False)) for record in records])
+        return self._add_new(lambda: list(map(to_line, records)))
 
     def take_in(self) -> int:
         """Take in what workers have left of blocks that still run; returns how many cases were not there yet."""
         return self._add_new(self._pieces.new)
 
-    def _add_new(self, come: Callable[[], list[dict[str, Any]]]) -> int:
+    def _add_new(self, come: Callable[[], list[bytes]]) -> int:
         journal = self._journal
         assert journal is not None, "the store is not open"
         with self._adding:
-            new = [r for r in come() if self.records.get(r["row"]["case_id"]) != r]
-            for record in new:
-                self.records[record["row"]["case_id"]] = record
-                journal.write(to_line(record))
+            new = 0
+            for line in come():
+                head = head_of(line)
+                assert head is not None
+                kept = self._kept.get(head.case_id)
+                if kept is None or kept.head.checksum != head.checksum:
+                    self._kept[head.case_id] = Kept(head, journal.tell(), len(line))
+                    journal.write(line)
+                    new += 1
             if new:
                 journal.flush()
                 os.fsync(journal.fileno())
-            return len(new)
+            return new
 
     def strangers(self, cases: Iterable[Case]) -> list[Path]:
         """Logs in the folder that are of none of the cases: of winds and integrators that have left the campaign."""
@@ -179,23 +241,41 @@ class Store:
                 raise InputError(f"{self.out} {_difference(key, theirs.get(key), mine)}")
         self.earlier = {} if self._fresh else theirs
 
-    def _read_records(self) -> dict[str, dict[str, Any]]:
+    def _read_journal(self) -> dict[str, Kept]:
         """The last record of every case; one that is damaged or was cut off is as if it were never written."""
+        found, self.damaged, self._seen = {}, 0, self._state()
         try:
-            found, self.damaged = whole_records((self.out / "cases.jsonl").read_bytes())
+            with self._journal_path.open("rb") as journal:
+                for place, line in lines_of(journal):
+                    head = head_of(line)
+                    if head is not None:
+                        found[head.case_id] = Kept(head, place, len(line))
+                    elif line.endswith(b"\n"):
+                        self.damaged += 1
         except FileNotFoundError:
             return {}
-        return {record["row"]["case_id"]: record for record in found}
+        return found
+
+    def _state(self) -> tuple[int, int] | None:
+        """Size and time of the journal; None where there is none, or nothing in it."""
+        try:
+            found = self._journal_path.stat()
+        except FileNotFoundError:
+            return None
+        return (found.st_size, found.st_mtime_ns) if found.st_size else None
 
     def _ends_with_a_line(self) -> bool:
-        content = (self.out / "cases.jsonl").read_bytes()
-        return not content or content.endswith(b"\n")
+        with self._journal_path.open("rb") as journal:
+            if not journal.seek(0, os.SEEK_END):
+                return True
+            journal.seek(-1, os.SEEK_END)
+            return journal.read() == b"\n"
 
-    def _log_complete(self, record: dict[str, Any]) -> bool:
+    def _log_complete(self, head: Head) -> bool:
         """Whether the log is, to the last bit, what was written."""
         from fatigue_runner.logbook import checksum
 
-        case_id = record["row"]["case_id"]
+        case_id, record = head.case_id, head.record
         path = self.log_path(case_id)
         try:
             found = path.stat()
@@ -211,11 +291,16 @@ class Store:
     def _clear(self) -> None:
         """Remove what earlier runs of this campaign left: `--fresh` asked for it."""
         assert self._journal is not None
-        for case_id in self._read_records():
+        for case_id in self._read_journal():
             self.log_path(case_id).unlink(missing_ok=True)
         self._journal.truncate(0)
+        self._journal.seek(0)
         for name in _RESULTS:
             (self.out / name).unlink(missing_ok=True)
+
+
+def _as_json(data: dict[str, Any]) -> bytes:
+    return json.dumps(data, indent=1).encode()
 
 
 def _refuse_place(out: Path) -> None:

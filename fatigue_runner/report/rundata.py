@@ -20,7 +20,7 @@ from fatigue_runner.results.cells import Row, number, text
 from fatigue_runner.results.columns import WIND
 from fatigue_runner.results.lifetime_section import LifetimeSection
 from fatigue_runner.results.ranking import MethodSummary, fatigue_columns, integrator_key, rank, reference_of
-from fatigue_runner.results.table import read_results
+from fatigue_runner.results.table import read_rows
 
 if TYPE_CHECKING:
     from fatigue_runner.logbook import Log
@@ -68,6 +68,17 @@ class Run:
     def name(self) -> str:
         """The campaign's name; the folder's where the campaign has none."""
         return str(self.campaign.get("name") or self.folder.resolve().name)
+
+    @cached_property
+    def _by_integrator(self) -> dict[tuple[Any, ...], list[Row]]:
+        found: dict[tuple[Any, ...], list[Row]] = {}
+        for row in self.rows:
+            found.setdefault(integrator_key(row), []).append(row)
+        return found
+
+    def rows_of(self, summary: MethodSummary) -> list[Row]:
+        """All rows of one integrator."""
+        return self._by_integrator.get(summary.key, [])
 
     @cached_property
     def reference(self) -> MethodSummary | None:
@@ -173,8 +184,7 @@ def load_run(folder: Path) -> Run:
     Raises InputError, one sentence, for a folder without results, an empty or foreign table, or unreadable
     settings.
     """
-    rows = read_results(folder)
-    run = Run(folder, rows, *_read_settings(folder))
+    run = Run(folder, read_rows(folder), *_read_settings(folder))
     planned, times = (_stored(folder, key) for key in ("cases", "evaluation_times"))
     run.planned = planned if isinstance(planned, int) else None
     run.evaluation_times = times if isinstance(times, Mapping) else {}

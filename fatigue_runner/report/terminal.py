@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from fatigue_runner.channels import BY_NAME
 from fatigue_runner.results.cells import Row, format_percent
@@ -13,11 +13,9 @@ from fatigue_runner.results.ranking import (
     MethodSummary,
     answer,
     fatigue_columns,
-    integrator_key,
     rank,
     unseen_winds,
 )
-from fatigue_runner.results.relevance import relevant_errors
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -83,7 +81,7 @@ def _table(rows: Sequence[Row], summaries: Sequence[MethodSummary], console: Con
             _figure(None if wall_time is None else wall_time * 1e3, "{:.3g}"),
             _figure(summary.nrmse_median, "{:.1e}"),
             _figure(summary.nrmse_worst, "{:.1e}"),
-            *(_worst_error(rows, summary, fatigue, group) for group in groups.values()),
+            *(_worst_error(summary, group) for group in groups.values()),
             _verdict(summary),
         )
     table.caption = (
@@ -93,15 +91,8 @@ def _table(rows: Sequence[Row], summaries: Sequence[MethodSummary], console: Con
     return table
 
 
-def _worst_error(rows: Sequence[Row], summary: MethodSummary, fatigue: Any, channels: Sequence[str]) -> str:
-    rows = [row for row in rows if integrator_key(row) == summary.key and row["status"] == "done"]
-    counted = {suffix for channel, _, suffix in fatigue if channel in channels}
-    errors = [
-        100 * abs(e)
-        for row in rows
-        for suffix, e in relevant_errors(row, fatigue).items()
-        if suffix in counted
-    ]
+def _worst_error(summary: MethodSummary, channels: Sequence[str]) -> str:
+    errors = [100 * error.size for error in summary.channel_errors if error.channel in channels]
     if not errors:
         return ""
     return f"{max(errors):.2g}" if max(errors) >= 1e-3 else "< 0.001"

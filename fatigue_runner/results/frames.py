@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fatigue_runner.errors import InputError
+from fatigue_runner.results.rows import Rows as ByColumns
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -30,8 +31,11 @@ def to_arrow(rows: Rows, kinds: Mapping[str, str]) -> Any:
             "pyarrow is not installed; `pip install pyarrow`, or use `rows`, plain dicts"
         ) from None
     types = {"text": pa.string(), "truth": pa.bool_(), "whole": pa.int64(), "number": pa.float64()}
-    schema = pa.schema([(name, types[kind]) for name, kind in kinds.items()])
-    return pa.Table.from_pylist([dict(row) for row in rows], schema=schema)
+    return pa.table({name: pa.array(_column(rows, name), types[kind]) for name, kind in kinds.items()})
+
+
+def _column(rows: Rows, name: str) -> list[Any]:
+    return rows.column(name) if isinstance(rows, ByColumns) else [row.get(name) for row in rows]
 
 
 def rows_of(table: Any) -> Rows:

@@ -276,7 +276,7 @@ def label_of(integrator: Key) -> str:
 
 def damage_columns(rows: Iterable[Row]) -> list[tuple[str, float, str]]:
     """(place, azimuth [deg], column) of every damage that the table has."""
-    names = dict.fromkeys(str(column) for row in rows for column in row)
+    names = dict.fromkeys(str(column) for columns in dict.fromkeys(map(tuple, rows)) for column in columns)
     found = (m for m in map(_DAMAGE.match, names) if m is not None)
     return [(m["place"], float(m["azimuth"]), m.string) for m in found]
 

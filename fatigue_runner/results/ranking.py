@@ -78,6 +78,7 @@ class MethodSummary:
     nrmse_worst: float | None
     worst_del_error: DelError | None
     median_del_error: float | None
+    channel_errors: tuple[DelError, ...] = ()  # the worst of every channel
     on_front: bool = False
     unseen: Unseen | None = None
 
@@ -120,7 +121,8 @@ def section_columns(rows: Sequence[Row]) -> list[tuple[str, float, str]]:
 
 
 def _del_columns(rows: Sequence[Row]) -> list[tuple[str, float, str]]:
-    names = dict.fromkeys(str(column) for row in rows for column in row)
+    alike = dict.fromkeys(tuple(row) for row in rows)  # most rows have the same columns
+    names = dict.fromkeys(str(column) for columns in alike for column in columns)
     found = (m for m in map(_DEL.match, names) if m is not None)
     return [(m["channel"], float(m["exponent"]), f"{m['channel']}_m{m['exponent']}") for m in found]
 
@@ -142,7 +144,7 @@ def _summarise(
     method, step, corrector, mode, is_reference = key
     done = [row for row in rows if text(row, "status") == "done"]
     nrmse = numbers(done, "nrmse_max")
-    errors = [] if is_reference else _del_errors(done, columns)
+    worst, middle = ((), None) if is_reference else _del_errors(done, columns)
     return MethodSummary(
         method=method,
         step=step,
@@ -157,8 +159,9 @@ def _summarise(
         wall_time_per_second=_median_of(wall_times_per_second(done)),
         nrmse_median=None if is_reference else _median_of(nrmse),
         nrmse_worst=None if is_reference else max(nrmse, default=None),
-        worst_del_error=max(errors, key=lambda e: e.size, default=None),
-        median_del_error=_median_of([e.size for e in errors]),
+        worst_del_error=max(worst, key=lambda e: e.size, default=None),
+        median_del_error=middle,
+        channel_errors=worst,
         unseen=unseen(rows),
     )
 
@@ -174,18 +177,25 @@ def wall_times_per_second(rows: Iterable[Row]) -> list[float]:
     return [wall / duration for wall, duration in pairs if wall is not None and duration]
 
 
-def _del_errors(rows: list[Row], columns: list[tuple[str, float, str]]) -> list[DelError]:
-    found = []
+def _del_errors(
+    rows: list[Row], columns: list[tuple[str, float, str]]
+) -> tuple[tuple[DelError, ...], float | None]:
+    """The largest DEL error of each channel, in the order of the columns, and the median of all sizes."""
+    sizes: list[float] = []
+    worst: dict[str, tuple[float, float, Row]] = {}
     for row in rows:
         errors = relevant_errors(row, columns)
         for channel, exponent, suffix in columns:
-            if suffix in errors:
-                found.append(
-                    DelError(
-                        errors[suffix], channel, exponent, text(row, "case_id"), number(row, "wind_speed")
-                    )
-                )
-    return found
+            error = errors.get(suffix)
+            if error is not None:
+                sizes.append(abs(error))
+                if channel not in worst or abs(error) > abs(worst[channel][0]):
+                    worst[channel] = error, exponent, row
+    found = [
+        DelError(error, channel, exponent, text(row, "case_id"), number(row, "wind_speed"))
+        for channel, (error, exponent, row) in worst.items()
+    ]
+    return tuple(found), _median_of(sizes)
 
 
 def _mark_front(summaries: list[MethodSummary]) -> list[MethodSummary]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 import zlib
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Iterator
+from typing import Any, BinaryIO, NamedTuple
 
 _HEAD = b'{"crc32":"%08x",'
 _SIZE = len(_HEAD % 0)
+_ROW = b', "row": {'  # the last entry of a record
+_CASE, _STATUS = re.compile(rb'"case_id": "([^"\\]+)"'), re.compile(rb'"status": "(\w+)"')
 
 
 def to_line(record: dict[str, Any]) -> bytes:
@@ -25,6 +28,41 @@ def from_line(line: bytes) -> dict[str, Any] | None:
         return None
     record: dict[str, Any] = json.loads(b"{" + line[_SIZE:])
     return record
+
+
+class Head(NamedTuple):
+    """What tells whether a case is finished: its record without the row, `columns` counts that one's cells; checksum: of the line."""
+
+    case_id: str
+    status: str
+    columns: int
+    record: dict[str, Any]
+    checksum: int
+
+
+def head_of(line: bytes) -> Head | None:
+    """The head of the record in a line, at a tenth of the time that the whole takes; None as `from_line`."""
+    line = line.removesuffix(b"\n").removesuffix(b"\r")
+    checksum = zlib.crc32(line[_SIZE:])
+    if line[:_SIZE] != _HEAD % checksum:
+        return None
+    head, _, row = line.partition(_ROW)
+    case, status = _CASE.match(row), _STATUS.search(row)
+    if case is None or status is None:  # none of to_line's own
+        record = json.loads(b"{" + line[_SIZE:])
+        cells = record.pop("row")
+        return Head(cells["case_id"], cells.get("status", ""), len(cells), record, checksum)
+    names = case[1].decode(), status[1].decode()
+    return Head(*names, row.count(b'": '), json.loads(b"{" + head[_SIZE:] + b"}"), checksum)
+
+
+def lines_of(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """(place, line) of the lines of a journal, without empty ones."""
+    place = 0
+    for line in file:
+        if line.strip():
+            yield place, line
+        place += len(line)
 
 
 def whole_records(text: bytes) -> tuple[list[dict[str, Any]], int]:

@@ -7,6 +7,7 @@ library only, as `ranking`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
 
 from fatigue_runner.results.cells import Row, number
 
@@ -14,6 +15,7 @@ from fatigue_runner.results.cells import Row, number
 FLOOR = 0.01
 
 
+@cache
 def place_of(channel: str) -> str:
     """What channels of one cross-section have in common: `tower_base`, `blade1_root`."""
     return "_".join(channel.split("_")[:2])
@@ -37,21 +39,27 @@ def relevant(error: float, load: float | None, governs: float) -> float:
 
 def relevant_errors(row: Row, columns: Sequence[tuple[str, float, str]]) -> dict[str, float]:
     """{suffix: error} of a row's DEL errors as they count in the verdict; columns: `ranking.fatigue_columns`."""
-    found: dict[str, float] = {}
-    errors = {
-        suffix: value for _, _, suffix in columns if (value := number(row, f"del_error_{suffix}")) is not None
+    # as `governing`, of all channels at once: a report asks for thousands of rows
+    errors: dict[str, float] = {}
+    exact: dict[str, float | None] = {}
+    governs: dict[tuple[str, float], float] = {}
+    places = [(suffix, (place_of(channel), exponent)) for channel, exponent, suffix in columns]
+    for suffix, place in places:
+        error = number(row, f"del_error_{suffix}")
+        if error is not None:
+            errors[suffix], exact[suffix] = error, _reference(number(row, f"del_{suffix}"), error)
+            governs[place] = max(governs.get(place, 0.0), abs(exact[suffix] or 0.0))
+    if not errors:
+        return {}
+    means: dict[str, float] = {}
+    for channel in dict.fromkeys(channel for channel, _, _ in columns):
+        mean, where = number(row, f"mean_{channel}"), place_of(channel)
+        means[where] = max(means.get(where, 0.0), abs(mean or 0.0))
+    return {
+        suffix: relevant(errors[suffix], exact[suffix], max(governs[place], means[place[0]]))
+        for suffix, place in places
+        if suffix in errors
     }
-    exact = {suffix: _reference(number(row, f"del_{suffix}"), error) for suffix, error in errors.items()}
-    means = {channel: number(row, f"mean_{channel}") for channel in dict.fromkeys(c for c, _, _ in columns)}
-    for channel, exponent, suffix in columns:
-        if suffix not in errors:
-            continue
-        same = {
-            c: [means[c], *(exact.get(s) for name, m, s in columns if name == c and m == exponent)]
-            for c in means
-        }
-        found[suffix] = relevant(errors[suffix], exact[suffix], governing(channel, same))
-    return found
 
 
 def _reference(load: float | None, error: float) -> float | None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,11 +18,13 @@ from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.results.columns import NEEDED, Column, kind_of, units_csv
 from fatigue_runner.results.frames import to_arrow, to_pandas
-from fatigue_runner.results.records import whole_records
+from fatigue_runner.results.records import from_line, lines_of
+from fatigue_runner.results.rows import Rows
 
 if TYPE_CHECKING:
     from fatigue_runner.results.lifetime import Life
 
+_LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+")
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
 
 
@@ -35,13 +38,13 @@ def known(value: Any) -> Any:
 class Results:
     """The outcome of a campaign: one row per case, in the order of the campaign.
 
-    rows: dicts with every column, None where a figure is unknown; out: the run folder; `simulated` and `kept`
+    rows: mappings with every column, None where a figure is unknown; out: the run folder; `simulated` and `kept`
     count the cases that ran now and those that an earlier run had finished; life: what they stand for, where the campaign asks for it.
     """
 
     out: Path
     columns: list[str]
-    rows: list[dict[str, Any]]
+    rows: Sequence[Mapping[str, Any]]
     simulated: int = 0
     kept: int = 0
     wall_time: float = 0.0
@@ -53,7 +56,7 @@ class Results:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def __iter__(self) -> Iterator[dict[str, Any]]:
+    def __iter__(self) -> Iterator[Mapping[str, Any]]:
         return iter(self.rows)
 
     def column(self, name: str) -> list[Any]:
@@ -64,12 +67,12 @@ class Results:
             raise InputError(f"the results have no column {name!r}{did_you_mean(name, self.columns)}")
         return [row[name] for row in self.rows]
 
-    def where(self, **conditions: Any) -> list[dict[str, Any]]:
+    def where(self, **conditions: Any) -> list[Mapping[str, Any]]:
         """The rows whose columns have these values: `results.where(method="heun", step=0.01)`."""
         return [row for row in self.rows if all(row[key] == value for key, value in conditions.items())]
 
     @property
-    def lost(self) -> list[dict[str, Any]]:
+    def lost(self) -> list[Mapping[str, Any]]:
         """The rows of the cases that diverged or failed."""
         return [row for row in self.rows if row["status"] != "done"]
 
@@ -80,11 +83,8 @@ class Results:
 
     def write(self) -> None:
         """Write `results.csv` with `columns.csv`, which says what its columns are, and `results.parquet` where pyarrow is installed."""
-        text = io.StringIO()
-        writer = csv.DictWriter(text, self.columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)  # None becomes an empty cell
-        write_atomically(self.out / "results.csv", text.getvalue().encode())
+        rows = self.rows if isinstance(self.rows, Rows) else Rows(self.columns, self.rows)
+        write_atomically(self.out / "results.csv", _csv(rows))
         if self.meanings:
             write_atomically(self.out / "columns.csv", units_csv(self.meanings).encode())
         self._write_parquet()
@@ -103,30 +103,49 @@ class Results:
         except ImportError:
             return
         buffer = io.BytesIO()
-        pq.write_table(self.to_arrow(), buffer)
+        pq.write_table(self.to_arrow(), buffer, use_dictionary=False)  # of numbers that are all different
         write_atomically(self.out / "results.parquet", buffer.getvalue())
 
 
-def _rows(text: str) -> list[dict[str, str]]:
-    """The rows of a table, also of one that a spreadsheet has written again: with other separators, and then with decimal commas."""
+def _csv(rows: Rows) -> Iterator[bytes]:
+    """The lines of a table as CSV; the unknown is an empty cell."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    for cells in itertools.chain([rows.columns], rows.cells()):
+        writer.writerow(cells)
+        yield text.getvalue().encode()
+        text.seek(0)
+        text.truncate()
+
+
+def _text_rows(text: str) -> Iterator[list[str]]:
+    """The heading and the rows of a table, as many cells in each, also of one that a spreadsheet has written again: with other
+    separators, and then with decimal commas."""
     heading = text.partition("\n")[0]
     separator = max(",;\t", key=heading.count)
-    rows = list(csv.DictReader(io.StringIO(text, newline=""), delimiter=separator))
-    if separator == ",":
-        return rows
-    return [{key: _with_point(value) for key, value in row.items()} for row in rows]
+    # not StringIO, which would hold the text again at four bytes a character
+    reader = csv.reader((line[0] for line in _LINE.finditer(text)), delimiter=separator)
+    names = next(reader, [])
+    yield names
+    for cells in filter(None, reader):
+        whole = [*cells[: len(names)], *[""] * (len(names) - len(cells))]
+        yield whole if separator == "," else [_with_point(cell) for cell in whole]
 
 
-def _with_point(cell: Any) -> Any:
-    return (
-        cell.replace(",", ".") if isinstance(cell, str) and _DECIMAL_COMMA.fullmatch(cell.strip()) else cell
-    )
+def _with_point(cell: str) -> str:
+    return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell.strip()) else cell
 
 
 def _finished_cases(journal: Path) -> list[dict[str, Any]]:
     """The last row of every case of a journal; a line that a crash cut off is as if it were never written."""
-    found, _ = whole_records(journal.read_bytes())
-    return list({record["row"]["case_id"]: record["row"] for record in found}.values())
+    with journal.open("rb") as file:
+        records = (from_line(line.rstrip(b"\n")) for _, line in lines_of(file))
+        found = {record["row"]["case_id"]: record["row"] for record in records if record is not None}
+    if not found:
+        raise InputError(
+            f"{journal.parent}: the run has not finished a case yet; `fatigue-runner run` goes on with it"
+        )
+    return list(found.values())
 
 
 def read_results(folder: Path) -> list[dict[str, Any]]:
@@ -135,29 +154,59 @@ def read_results(folder: Path) -> list[dict[str, Any]]:
 
     Raises InputError, one sentence, for a folder without results and an empty or foreign table.
     """
+    if _unfinished(folder):
+        return _finished_cases(folder / "cases.jsonl")
+    names, rows = _read(folder)
+    return [dict(zip(names, cells, strict=True)) for cells in rows]
+
+
+def read_rows(folder: Path) -> Rows:
+    """The same in little memory, numbers as numbers and None for what is unknown."""
+    if _unfinished(folder):
+        cases = _finished_cases(folder / "cases.jsonl")
+        return Rows(cases[-1], ({name: row.get(name) for name in cases[-1]} for row in cases))
+    names, rows = _read(folder)
+    found = Rows(names)
+    found.extend_text(rows)
+    return found
+
+
+def _unfinished(folder: Path) -> bool:
+    return not (folder / "results.csv").is_file() and (folder / "cases.jsonl").is_file()
+
+
+def _read(folder: Path) -> tuple[list[str], Iterable[list[str]]]:
+    """Names and cells of `results.csv`."""
     table = folder / "results.csv"
-    if not table.is_file() and (folder / "cases.jsonl").is_file():
-        found = _finished_cases(folder / "cases.jsonl")
-        if not found:
-            raise InputError(
-                f"{folder}: the run has not finished a case yet; `fatigue-runner run` goes on with it"
-            )
-        return found
     if not table.is_file():
         if not folder.is_dir():
             what = "is a file" if folder.exists() else "does not exist"
             raise InputError(f"{folder} {what}; give the output folder of `fatigue-runner run`")
         raise InputError(f"{folder} holds no results.csv; give the output folder of `fatigue-runner run`")
-    try:
-        text = decoded(table.read_bytes(), table, "the results table")
-        rows = _rows(text)
-    except (OSError, csv.Error) as error:
-        raise InputError(
-            f"{table} cannot be read as CSV: {error}; run the campaign again to rewrite it"
-        ) from None
-    if not rows:
+    rows = _told(_text_rows(_text_of(table)), table)
+    names, first = next(rows, []), next(rows, None)
+    if first is None:
         raise InputError(f"{table} has no cases; run the campaign again to fill it")
-    missing = [column for column in NEEDED if column not in rows[0]]
+    missing = [column for column in NEEDED if column not in names]
     if missing:
         raise InputError(f"{table} lacks the column {missing[0]!r}; is it the results table of a campaign?")
-    return rows
+    return names, itertools.chain([first], rows)
+
+
+def _text_of(table: Path) -> str:
+    try:
+        return decoded(table.read_bytes(), table, "the results table")
+    except OSError as error:
+        raise _unreadable(table, error) from None
+
+
+def _told(rows: Iterable[list[str]], table: Path) -> Iterator[list[str]]:
+    """The same rows; what is no CSV is told in a sentence."""
+    try:
+        yield from rows
+    except csv.Error as error:
+        raise _unreadable(table, error) from None
+
+
+def _unreadable(table: Path, error: Exception) -> InputError:
+    return InputError(f"{table} cannot be read as CSV: {error}; run the campaign again to rewrite it")

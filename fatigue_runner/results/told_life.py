@@ -15,7 +15,7 @@ from fatigue_runner.results.cells import Row
 from fatigue_runner.results.frames import rows_of
 from fatigue_runner.results.lifetime import Life, life_of
 from fatigue_runner.results.lifetime_section import LifetimeSection
-from fatigue_runner.results.table import read_results
+from fatigue_runner.results.table import read_rows
 
 
 class ToldLife(Life):
@@ -37,7 +37,7 @@ def lifetime(results: Any, climate: Any = None, **keys: Any) -> ToldLife:
     given: dict[str, Any] = {}
     if isinstance(results, str | Path):
         given = _section_of(Path(results))
-        rows: Sequence[Row] = read_results(Path(results))
+        rows: Sequence[Row] = read_rows(Path(results))
     else:
         rows = rows_of(results)
         given = _section_of(results.out) if hasattr(results, "out") else {}

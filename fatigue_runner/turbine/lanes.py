@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,13 +19,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class KernelData:
-    """What the kernels of `model` read for one turbine: constants, and the cells of the equations' and of all tables."""
+    """What the kernels of `model` read for one turbine: constants, and the cells of the equations' tables and of all."""
 
     model: Model
     constants: Array
     tables: Array
-    load_tables: Array
+    make_load_tables: Callable[[], Array]
     cells: int
+
+    @cached_property
+    def load_tables(self) -> Array:
+        """Cells of all tables: made when loads are asked for, since they can take 50 MB."""
+        return self.make_load_tables()
 
     def arrays(self, clamped: NDArray[np.int64]) -> KernelArrays:
         """For `model.rhs`; clamped (LANES,) counts look-ups outside the tables."""

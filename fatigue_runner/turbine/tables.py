@@ -154,20 +154,26 @@ class AeroTables:
         parent = np.searchsorted(self.pitch, starts + step / 2) - 1
         # place and width of the cell within its parent
         at, width = (starts - self.pitch[parent]) / steps[parent], step / steps[parent]
-        at, width = (x.reshape(-1, *[1] * (nodes.ndim - 1)) for x in (at, width))
-        c0, c1, c2, c3 = (part[parent] for part in parts)
-        cells = ((c3 * at + c2) * at + c1) * at + c0, (3 * c3 * at + 2 * c2) * at + c1, 3 * c3 * at + c2, c3
+        at, width = (x.reshape(-1, *[1] * (nodes.ndim - 2)) for x in (at, width))
         header = self._header()
         header[2:5] = self.pitch[0], 1.0 / step, count
         # on a cache line from the start: copying megabytes for every block would cost as much as running it
-        size = HEADER + 4 * cells[0].size
+        size = HEADER + 4 * count * nodes[0].size
         room = np.empty(size + HEADER)
         begin = -room.ctypes.data % 64 // 8
         out = room[begin : begin + size]
         out[:HEADER] = header
         body = out[HEADER:].reshape(count, nodes.shape[1], 4, *nodes.shape[2:])
-        for power, values in enumerate(cells):
-            body[:, :, power] = values * width**power
+        for ratio in range(nodes.shape[1]):  # one by one: all at once they take as much again as the result
+            c0, c1, c2, c3 = (part[parent, ratio] for part in parts)
+            cells = (
+                ((c3 * at + c2) * at + c1) * at + c0,
+                (3 * c3 * at + 2 * c2) * at + c1,
+                3 * c3 * at + c2,
+                c3,
+            )
+            for power, values in enumerate(cells):
+                body[:, ratio, power] = values * width**power
         return out
 
     def _header(self) -> NDArray[np.float64]:

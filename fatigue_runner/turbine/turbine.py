@@ -436,7 +436,7 @@ def _data_at_pitch(turbine: Turbine, model: Model, pitch: float) -> KernelData:
         model=model,
         constants=kernel.constants(at_pitch(turbine.parameters, pitch)),
         tables=turbine.tables.cells(pitch, kernel.TABLES[: kernel.EQUATION_TABLES]),
-        load_tables=turbine.tables.cells(pitch, kernel.TABLES),
+        make_load_tables=lambda: turbine.tables.cells(pitch, kernel.TABLES),
         cells=len(turbine.tables.tip_speed_ratio) - 1,
     )
 
@@ -450,7 +450,7 @@ def _data_for_every_pitch(turbine: Turbine, model: Model) -> KernelData:
         model=model,
         constants=kernel.constants({**turbine.parameters, **turbine.control_parameters}),
         tables=_pitched_cells(turbine.tables, kernel.TABLES[: kernel.EQUATION_TABLES]),
-        load_tables=_pitched_cells(turbine.tables, kernel.TABLES),
+        make_load_tables=lambda: _pitched_cells(turbine.tables, kernel.TABLES),
         cells=len(turbine.tables.tip_speed_ratio) - 1,
     )
 

@@ -16,6 +16,7 @@ with rho = r/R, as in `turbine.equations`.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,7 @@ def radial_shares(radii: Any, weight: Any, rotor_radius: float) -> tuple[np.ndar
     return radii, weight / total
 
 
+@cache
 def disc_rule(nodes: int = 48) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Radii as fractions of R (n,), weights of the disc mean (n,) and of the slopes per radius (n,).
 

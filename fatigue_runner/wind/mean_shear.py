@@ -71,6 +71,11 @@ def one_profile(section: Any) -> None:
 
 def mean_signals(profile: Profile, speed: float, rotor: Rotor, harmonics: int) -> np.ndarray:
     """Signals (3 + 2 M,) of a profile with `speed` [m/s] at hub height; (3,) for M of 0 (no shear) and 1 (the slope at the hub)."""
+    return _mean_signals(profile, speed, rotor, harmonics).copy()
+
+
+@lru_cache(maxsize=256)  # one mean wind has many seeds
+def _mean_signals(profile: Profile, speed: float, rotor: Rotor, harmonics: int) -> np.ndarray:
     if harmonics < 2:
         slope = profile.factor(np.array([1.001, 0.999]) * rotor.hub_height, rotor.hub_height)
         kappa = float(slope[0] - slope[1]) / 0.002 * rotor.radius / rotor.hub_height

@@ -27,8 +27,8 @@ from __future__ import annotations
 import inspect
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from functools import cache, cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -193,7 +193,7 @@ def make_wind(kind: str, **parameters: Any) -> WindSource:
     """
     if not isinstance(kind, str) or kind not in SOURCES:
         raise InputError(f"unknown wind source {kind!r}{did_you_mean(str(kind), SOURCES)}")
-    known = inspect.signature(SOURCES[kind]).parameters
+    known = _parameters(SOURCES[kind])
     for key in parameters:
         if key not in known:
             raise InputError(f"unknown parameter {key!r} of {kind} wind{did_you_mean(key, known)}")
@@ -201,3 +201,9 @@ def make_wind(kind: str, **parameters: Any) -> WindSource:
         if parameter.default is parameter.empty and key not in parameters:
             raise InputError(f"{kind} wind needs {key!r}; give it a value")
     return SOURCES[kind](**parameters)
+
+
+@cache
+def _parameters(source: type[WindSource]) -> Mapping[str, inspect.Parameter]:
+    """By name; a campaign makes thousands of winds of one kind."""
+    return inspect.signature(source).parameters

@@ -21,6 +21,7 @@ from fatigue_runner.errors import FatigueRunnerError, InputError
 from fatigue_runner.fatigue import damage_equivalent_load, short_term_cycles
 from fatigue_runner.logbook import read_log
 from fatigue_runner.results.columns import columns
+from fatigue_runner.results.records import from_line
 from fatigue_runner.results.table import read_results
 
 
@@ -672,7 +673,7 @@ def test_cases_count_one_by_one_while_their_block_runs(tmp_path):
     pieces = Pieces(tmp_path)
     for name in ("a", "b"):
         leave(tmp_path, "block", {"row": {"case_id": name}})
-        assert [record["row"]["case_id"] for record in pieces.new()] == [name]
+        assert [from_line(line.rstrip())["row"]["case_id"] for line in pieces.new()] == [name]
     assert pieces.new() == []
 
 

@@ -8,10 +8,12 @@ import random
 import signal
 import subprocess
 import sys
+import textwrap
 import time
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
 from fatigue_runner.campaign import run_campaign
 from fatigue_runner.errors import InputError
@@ -142,9 +144,7 @@ def when(condition, seconds: float = 300.0) -> None:
 
 
 @pytest.mark.slow(reason="whole runs in processes of their own, ended by real signals")
-@pytest.mark.parametrize(
-    ("number", "code", "workers"), [("SIGTERM", 143, "2"), ("SIGHUP", 129, "2"), ("SIGINT", 130, "1")]
-)
+@pytest.mark.parametrize(("number", "code", "workers"), [("SIGHUP", 129, "2"), ("SIGINT", 130, "1")])
 def test_every_signal_ends_a_run_with_one_sentence_and_no_process_left(tmp_path, number, code, workers):
     campaign, out = write(tmp_path, winds=200), tmp_path / "out"
     run = started(campaign, out, "--workers", workers)
@@ -156,6 +156,51 @@ def test_every_signal_ends_a_run_with_one_sentence_and_no_process_left(tmp_path,
     assert time.monotonic() - begin < 20  # 3 s on a machine that does nothing else
     assert "are finished; the same command runs the rest" in errors and "Traceback" not in errors
     assert group_is_gone(run.pid, 20)
+
+
+@pytest.mark.slow(reason="a job script twice, in processes of its own")
+def test_the_job_script_of_the_docs_ends_with_sigterm_and_resumes(tmp_path):
+    """SLURM's own commands are stood in for: `srun` runs what follows, `scontrol` notes what it was asked."""
+    text = (ROOT / "docs" / "cluster.md").read_text(encoding="utf-8")
+    script = tmp_path / "job.sh"
+    script.write_text(textwrap.dedent(text[text.index("    #!/bin/bash") :].partition("\n\n")[0]) + "\n")
+    commands = tmp_path / "bin"
+    commands.mkdir()
+    for name, does in (
+        ("srun", 'exec "$@"'),
+        ("scontrol", f'echo "$@" >> {tmp_path}/asked'),
+        ("fatigue-runner", f'exec {sys.executable} -m fatigue_runner "$@"'),
+    ):
+        (commands / name).write_text(f"#!/bin/sh\n{does}\n")
+        (commands / name).chmod(0o755)
+    write(tmp_path, winds=60).rename(tmp_path / "my.yaml")
+    out = tmp_path / "dlc12"
+    environment = {
+        **os.environ, "PATH": f"{commands}:{os.environ['PATH']}", "SCRATCH": str(tmp_path), "SLURM_CPUS_PER_TASK": "2", "SLURM_JOB_ID": "7",
+    }  # fmt: skip
+
+    def submitted():
+        return subprocess.Popen(
+            ["bash", script], cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+            start_new_session=True,
+        )  # fmt: skip
+
+    job = submitted()
+    when(lambda: recorded(out))
+    job.send_signal(signal.SIGTERM)  # to the batch shell, as `--signal=B:TERM` has it
+    _, errors = job.communicate(timeout=60)
+    assert (
+        job.returncode == 143 and "the same command runs the rest" in errors and "Traceback" not in errors
+    ), errors
+    assert (tmp_path / "asked").read_text() == "requeue 7\n"
+    assert group_is_gone(job.pid, 20)
+    kept = len(recorded(out))
+    assert 0 < kept < 600
+    job = submitted()
+    told, errors = job.communicate(timeout=300)
+    assert job.returncode == 0, errors
+    assert f"{kept} of 600 cases are finished from an earlier run" in " ".join(told.split())
+    assert (tmp_path / "asked").read_text() == "requeue 7\n"
 
 
 @pytest.mark.slow(reason="a whole run in processes of its own")
@@ -410,7 +455,7 @@ def test_a_corrector_that_is_damaged_meanwhile_fails_its_own_cases_only(tmp_path
         own.unlink() if how == "gone" else own.write_bytes(own.read_bytes()[:500])
         integration.load_corrector.cache_clear()  # as in a worker that has not read it yet
 
-    monkeypatch.setattr(run, "_warm_up", damage)
+    monkeypatch.setattr(run, "warm_up", damage)
     results = run_campaign(campaign, tmp_path / "out", workers=1)
     assert {row["method"]: row["status"] for row in results.rows} == {"heun": "done", "rk4": "failed"}
     assert "mine.safetensors" in results.lost[0]["error_message"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import heapq
+
 from fatigue_runner.report.blocks import Block, Column, Paragraph, Section, Table, TableRow
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.report.sections.limits import lost_share
@@ -23,6 +25,7 @@ def _unfinished(run: Run) -> list[Block]:
     bad = [row for row in run.rows if text(row, "status") != "done"]
     if not bad:
         return [Paragraph(f"All {len(run.rows)} cases finished.")]
+    shown = bad[:MOST]
     columns = [
         *CASE_COLUMNS[:4],
         Column("Status", number=False),
@@ -31,10 +34,11 @@ def _unfinished(run: Run) -> list[Block]:
     ]
     rows = [
         TableRow([*_who(row), text(row, "status"), _at(row), text(row, "error_message") or "–"], "bad")
-        for row in bad
+        for row in shown
     ]
+    first = f"The first {MOST} stand here, all of them in results.csv. " if len(bad) > MOST else ""
     caption = (
-        f"Cases that did not finish: {len(bad)} of {len(run.rows)} ({format_percent(lost_share(run.rows))}). "
+        f"Cases that did not finish: {len(bad)} of {len(run.rows)} ({format_percent(lost_share(run.rows))}). {first}"
         "They are logged up to the time given and left out of every load."
     )
     return [Table(columns, rows, caption)]
@@ -58,7 +62,7 @@ def _all(run: Run) -> list[Block]:
     rows = [row for wind in run.winds for row in wind.rows]
     caption = f"All cases, by wind speed. {TIME} Every column of every channel is in results.csv."
     if len(rows) > MOST:
-        rows = sorted(rows, key=lambda row: -(_worst(run, row) or 0.0))[:MOST]
+        rows = heapq.nlargest(MOST, rows, key=lambda row: _worst(run, row) or 0.0)
         caption = f"The {MOST} of {len(run.rows)} cases with the largest DEL error. {TIME} All of them are in results.csv."
     return [Table(CASE_COLUMNS, [_case(run, row) for row in rows], caption)]
 

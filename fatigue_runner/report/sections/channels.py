@@ -7,11 +7,9 @@ from statistics import median
 from fatigue_runner.channels import BY_NAME, STATES
 from fatigue_runner.report.blocks import Block, Column, Section, Table, TableRow
 from fatigue_runner.report.rundata import Run
-from fatigue_runner.report.sections.limits import rows_of
 from fatigue_runner.report.selection import left_out, shown_integrators
-from fatigue_runner.results.cells import Row, format_error, format_percent, numbers
+from fatigue_runner.results.cells import format_error, format_percent, numbers
 from fatigue_runner.results.ranking import MethodSummary
-from fatigue_runner.results.relevance import relevant_errors
 
 ORDER = 60
 
@@ -29,10 +27,7 @@ def _dels(run: Run) -> Table:
     heads = [Column(BY_NAME[c].label if c in BY_NAME else c, "DEL error, worst (at m)") for c in channels]
     compared = [s for s in run.integrators if s.worst_del_error is not None]
     rows = [
-        TableRow(
-            [s.label, *(_worst(run, rows_of(run, s.key), c) for c in channels)], "" if s.complete else "bad"
-        )
-        for s in compared
+        TableRow([s.label, *(_worst(s, c) for c in channels)], "" if s.complete else "bad") for s in compared
     ]
     caption = (
         "Worst DEL error of each channel over all winds and exponents, with its sign; finished cases only. As in the verdict, see the "
@@ -41,18 +36,9 @@ def _dels(run: Run) -> Table:
     return Table([Column("Integrator", number=False), *heads], rows, caption)
 
 
-def _worst(run: Run, rows: list[Row], channel: str) -> str:
-    exponents = {suffix: exponent for name, exponent, suffix in run.columns if name == channel}
-    found = [
-        (value, exponents[suffix])
-        for row in rows
-        for suffix, value in relevant_errors(row, run.columns).items()
-        if suffix in exponents
-    ]
-    if not found:
-        return "–"
-    value, exponent = max(found, key=lambda item: abs(item[0]))
-    return f"{format_percent(value)} (m = {exponent:g})"
+def _worst(summary: MethodSummary, channel: str) -> str:
+    found = next((error for error in summary.channel_errors if error.channel == channel), None)
+    return "–" if found is None else f"{format_percent(found.value)} (m = {found.exponent:g})"
 
 
 def _states(run: Run) -> Table:
@@ -69,5 +55,5 @@ def _states(run: Run) -> Table:
 
 
 def _median(run: Run, summary: MethodSummary, column: str) -> str:
-    values = numbers(rows_of(run, summary.key), column)
+    values = numbers(run.rows_of(summary), column)
     return format_error(median(values) if values else None)

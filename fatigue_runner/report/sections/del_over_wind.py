@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from fatigue_runner.channels import BY_NAME, Channel
 from fatigue_runner.report.blocks import Figure, Paragraph, Section
 from fatigue_runner.report.rundata import Run
-from fatigue_runner.report.selection import left_out, shown_integrators
+from fatigue_runner.report.selection import by_speed, left_out, shown_integrators, together
 from fatigue_runner.report.style import (
     FAINT,
     INK,
@@ -23,7 +23,7 @@ from fatigue_runner.report.style import (
     styled,
     to_svg,
 )
-from fatigue_runner.results.cells import Row, number, numbers, text
+from fatigue_runner.results.cells import Row, numbers, text
 from fatigue_runner.results.life_words import customary_exponent
 from fatigue_runner.results.ranking import MethodSummary
 
@@ -47,7 +47,7 @@ def build(run: Run) -> Section:
         "its relative error against the reference of the same wind (below). Where a wind speed was run more "
         "than once, the line is the power mean and the error the largest. Grey line below, where there are "
         "seeds enough: standard deviation of the reference's DEL between seeds, "
-        "relative to its mean." + left_out(run, shown)
+        "relative to its mean." + together(run.rows) + left_out(run, shown)
     )
     return Section(
         title, [Figure(_draw(run, panels, shown), caption, "Damage-equivalent loads over wind speed")]
@@ -152,12 +152,7 @@ def _rows(run: Run, summary: MethodSummary) -> list[Row]:
 
 
 def _by_speed(rows: list[Row], column: str) -> list[tuple[float, list[float]]]:
-    groups: dict[float, list[float]] = {}
-    for row in rows:
-        speed, value = number(row, "wind_speed"), number(row, column)
-        if speed is not None and value is not None:
-            groups.setdefault(speed, []).append(value)
-    return sorted(groups.items())
+    return [(speed, found) for speed, group in by_speed(rows) if (found := numbers(group, column))]
 
 
 def _power_means(

@@ -3,8 +3,6 @@ know, missing references."""
 
 from __future__ import annotations
 
-from typing import Any
-
 from fatigue_runner.report.blocks import Section, Warnings
 from fatigue_runner.report.rundata import Run
 from fatigue_runner.results.beyond import beyond, no_pitch_control
@@ -45,13 +43,6 @@ def lost_share(rows: list[Row]) -> float:
     return sum(text(row, "status") != "done" for row in rows) / len(rows) if rows else 0.0
 
 
-def rows_of(run: Run, key: tuple[Any, ...]) -> list[Row]:
-    """All rows of one integrator."""
-    from fatigue_runner.results.ranking import integrator_key
-
-    return [row for row in run.rows if integrator_key(row) == key]
-
-
 def _operation(run: Run) -> list[str]:
     rated = float(run.fact("rated_rotor_speed") or 0.0) or None
     fixed = [no_pitch_control(rated)] if run.setting("operation") == "fixed" else []
@@ -62,7 +53,7 @@ def _lost(run: Run) -> list[str]:
     items = []
     for s in run.summaries:
         if s.cases and not s.complete:
-            share = format_percent(lost_share(rows_of(run, s.key)))
+            share = format_percent(lost_share(run.rows_of(s)))
             items.append(
                 f"{s.label}: {s.cases - s.done} of {s.cases} cases did not finish ({share}); no damage is counted for them. "
                 "They are listed below."

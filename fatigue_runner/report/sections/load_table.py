@@ -5,7 +5,6 @@ from __future__ import annotations
 from fatigue_runner.channels import BY_NAME, Channel
 from fatigue_runner.report.blocks import Column, Section, Table, TableRow
 from fatigue_runner.report.rundata import Run
-from fatigue_runner.report.sections.limits import rows_of
 from fatigue_runner.report.selection import left_out, shown_integrators
 from fatigue_runner.results.cells import format_percent, numbers, text
 from fatigue_runner.results.ranking import MethodSummary
@@ -37,7 +36,7 @@ def build(run: Run) -> Section | None:
 def _row(run: Run, shown: list[MethodSummary], channel: str, m: float, suffix: str) -> TableRow | None:
     known = BY_NAME.get(channel, Channel(channel, "", channel, ""))
     loads = [
-        numbers([row for row in rows_of(run, s.key) if text(row, "status") == "done"], f"del_{suffix}")
+        numbers([row for row in run.rows_of(s) if text(row, "status") == "done"], f"del_{suffix}")
         for s in shown
     ]
     if not any(loads):

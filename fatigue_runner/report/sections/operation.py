@@ -12,10 +12,10 @@ from fatigue_runner.channels import BY_NAME
 from fatigue_runner.report.blocks import Block, Column, Figure, Section, Table, TableRow
 from fatigue_runner.report.rundata import Run, WindCase
 from fatigue_runner.report.sections.histories import WINDOW, window_words
-from fatigue_runner.report.selection import shown_winds
+from fatigue_runner.report.selection import by_speed, shown_winds, together
 from fatigue_runner.report.style import COLOURS, INK, QUIET, new_figure, styled, to_svg
-from fatigue_runner.results.cells import Row, number, text
-from fatigue_runner.results.ranking import MethodSummary, integrator_key
+from fatigue_runner.results.cells import Row, number, numbers, text
+from fatigue_runner.results.ranking import MethodSummary
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,7 +33,12 @@ SHORT = {
 }
 DIGITS = {"rotor_speed": 2, "blade_pitch": 2, "generator_power": 0, "rotor_thrust": 1}
 MOST = 24  # mean speeds in the table; a random sweep has hundreds
+MOST_DOTS = 300  # winds that are drawn one by one
 WHAT = "Mean of each wind (dots), its standard deviation in time (bars) and its extremes (ticks), over the mean of the wind at hub height"
+WHAT_OF_MANY = (
+    "Mean over the winds of each mean wind speed (dots), root mean square of their standard deviations in time (bars) and the extremes of "
+    "all (ticks), over the mean of the wind at hub height"
+)
 
 
 def build(run: Run) -> Section | None:
@@ -43,12 +48,13 @@ def build(run: Run) -> Section | None:
     rows = _rows(run)
     if not any(number(row, "mean_rotor_speed") is not None for row in rows):
         return None
-    steady = run.operating_curve
+    steady, what = run.operating_curve, WHAT if len(rows) <= MOST_DOTS else WHAT_OF_MANY
     line = " The line is the operation in steady, uniform wind." if steady else ""
     blocks: list[Block] = [
         Figure(
             _draw_curves(rows, steady),
-            f"{WHAT}, by {_told(run).label}.{line} In turbulence power falls short of the line near rated wind, and thrust with it: a gust "
+            f"{what}, by {_told(run).label}.{together(rows)}{line} In turbulence power falls short of the line near rated wind, and "
+            "thrust with it: a gust "
             "gives no more than rated, a lull takes.",
             "Rotor speed, pitch, power and thrust over wind speed",
         ),
@@ -74,8 +80,7 @@ def _told(run: Run) -> MethodSummary:
 
 
 def _rows(run: Run) -> list[Row]:
-    key = _told(run).key
-    return [row for row in run.rows if integrator_key(row) == key and text(row, "status") == "done"]
+    return [row for row in run.rows_of(_told(run)) if text(row, "status") == "done"]
 
 
 def _case(run: Run, wind: WindCase) -> Log | None:
@@ -105,22 +110,32 @@ def _draw_curves(rows: list[Row], steady: Mapping[str, Sequence[float]]) -> str:
 
 
 def _draw_scatter(axes: Axes, rows: list[Row], name: str, scale: float) -> None:
-    for row in rows:
-        found = [
-            number(row, column)
-            for column in ("wind_speed", *(f"{f}_{name}" for f in ("mean", "std", "min", "max")))
-        ]
-        if any(value is None for value in found):
-            continue
-        wind, mean, std, low, high = (value for value in found if value is not None)
-        mean, std, low, high = (value * scale for value in (mean, std, low, high))
-        axes.plot(
-            [wind, wind], [mean - std, mean + std], color=COLOURS[0], linewidth=1.6, alpha=0.6, zorder=2
-        )
-        axes.plot(
-            [wind, wind], [low, high], color=QUIET, linestyle="none", marker="_", markersize=5, zorder=2
-        )
-        axes.plot(wind, mean, color=COLOURS[0], marker="o", markersize=3.5, markerfacecolor="white", zorder=3)
+    winds, means, spreads, lows, highs = [], [], [], [], []
+    for wind, group in _marks(rows):
+        found = [numbers(group, f"{figure}_{name}") for figure in ("mean", "std", "min", "max")]
+        if all(found):
+            winds.append(wind)
+            means.append(scale * fmean(found[0]))
+            spreads.append(scale * fmean(value**2 for value in found[1]) ** 0.5)
+            lows.append(scale * min(found[2]))
+            highs.append(scale * max(found[3]))
+    if not winds:
+        return
+    low, high = ([m + sign * s for m, s in zip(means, spreads, strict=True)] for sign in (-1, 1))
+    axes.vlines(winds, low, high, color=COLOURS[0], linewidth=1.6, alpha=0.6, zorder=2)
+    for extremes in (lows, highs):
+        axes.plot(winds, extremes, color=QUIET, linestyle="none", marker="_", markersize=5, zorder=2)
+    axes.plot(
+        winds, means, color=COLOURS[0], linestyle="none", marker="o", markersize=3.5,
+        markerfacecolor="white", zorder=3,
+    )  # fmt: skip
+
+
+def _marks(rows: list[Row]) -> list[tuple[float, list[Row]]]:
+    """(wind, its row) of every wind, or the rows of each mean wind speed where they are too many."""
+    if len(rows) > MOST_DOTS:
+        return by_speed(rows)
+    return [(speed, [row]) for row in rows if (speed := number(row, "wind_speed")) is not None]
 
 
 def _table(rows: list[Row]) -> Table:
@@ -131,10 +146,9 @@ def _table(rows: list[Row]) -> Table:
             Column(label[:1].upper() + label[1:], f"{BY_NAME[name].read_unit}, mean"),
             Column("±", "in time"),
         ]
-    speeds = sorted({speed for row in rows if (speed := number(row, "wind_speed")) is not None})
+    groups = by_speed(rows, len(rows))
     table = []
-    for speed in speeds[:: max(1, len(speeds) // MOST)]:
-        alike = [row for row in rows if number(row, "wind_speed") == speed]
+    for speed, alike in groups[:: max(1, len(groups) // MOST)]:
         cells = [f"{speed:.4g}", f"{len(alike)}"]
         for name in CURVES:
             cells += [

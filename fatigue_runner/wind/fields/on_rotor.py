@@ -47,7 +47,7 @@ def on_rotor(
 
     mean_speed, profile and box (`BOX_KEYS`) as in `FullFieldWind`. Raises InputError for what the readers and the projection refuse.
     """
-    files = _files(Path(path))
+    files = files_of(Path(path))
     try:
         stamps = tuple((str(p), p.stat().st_mtime_ns, p.stat().st_size) for p in files)
     except OSError as error:
@@ -60,12 +60,12 @@ def on_rotor(
 def content(path: Path) -> str:
     """Digest of all files that a wind file's wind depends on. Raises OSError where one cannot be read."""
     sha = hashlib.sha256()
-    for file in _files(path):
+    for file in files_of(path):
         sha.update(file.read_bytes())
     return sha.hexdigest()
 
 
-def _files(path: Path) -> list[Path]:
+def files_of(path: Path) -> list[Path]:
     """The file and what it needs beside it: the summary of a Bladed field, the binary that a description names."""
     if path.suffix.lower() in DESCRIPTIONS and path.is_file():
         return [path, described_file(path)]
