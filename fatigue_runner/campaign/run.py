@@ -246,10 +246,10 @@ def _run_again(
 
 
 def _sample(jobs: Sequence[Job]) -> Job:
-    """A job that needs every kernel which any of them needs: one case of each kind."""
+    """A job that needs every kernel which any of them needs: one case of each kind, of those that no log holds."""
     kinds: dict[Any, tuple[Case, np.ndarray]] = {}
     for job in jobs:
-        for case in (*job.references, *job.cases):
+        for case in (case for case in (*job.references, *job.cases) if case.id not in job.logged):
             method, wind = case.integration, case.wind
             key = method.method, method.corrector, method.mode, wind.kind, bool(wind.tower), any(wind.angles)
             kinds.setdefault(key, (case, job.initial[wind.id]))
