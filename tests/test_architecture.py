@@ -30,6 +30,7 @@ FLOOR = {
     "rotor",
     "_version",
     "interruption",
+    "stopwatch",
 }
 
 # Which rooms a room may import. A new room is one line here.

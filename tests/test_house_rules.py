@@ -110,7 +110,7 @@ NO_STATES = {
     "integrators/output.py": ("numbers of the interpolant", {"first[i, 6 - len(x):]"}),
     "integrators/stepping.py": (
         "numbers of the interpolant",
-        {"rows[0, 6]", "rows[0, 7]", "w[o, 6]", "w[o, 7]", "weights[0, 6]", "weights[0, 7]"},
+        {"rows[0, 6]", "rows[0, 7]", "w[line, 6]", "w[line, 7]", "weights[0, 6]", "weights[0, 7]"},
     ),
     "wind/fields/uniform.py": ("columns of the file", {"self.values[:, 6]", "values[:, [1, 7]]"}),
 }

@@ -1,4 +1,4 @@
-"""`fatigue-runner benchmark`: kernel, work-precision, paper, stability, wind, logs, live."""
+"""`fatigue-runner benchmark`: kernel, work-precision, paper, stability, wind, campaign, logs, live."""
 
 from __future__ import annotations
 
@@ -234,6 +234,29 @@ def wind(
 
     result = measured.measure(repeats)
     console().print(tables.wind(result))
+    _write(result, json)
+
+
+@app.command()
+def campaign(
+    duration: Annotated[
+        float, typer.Option("--duration", min=20.0, help="Simulated seconds per case.")
+    ] = 600.0,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Winds at each of ten speeds.")] = 16,
+    repeats: Annotated[int, typer.Option("--repeats", min=1, help="Runs of every situation, in turn.")] = 3,
+    json: Json = None,
+) -> None:
+    """Where a campaign's time goes: wind, integration, loads, counting, ..., logging; in one process and in two, with logs and without.
+
+    Example:
+
+        fatigue-runner benchmark campaign --json campaign.json
+    """
+    from fatigue_runner.benchmark.pages import tables
+    from fatigue_runner.benchmark.speed import campaign as measured
+
+    result = measured.measure(duration, seeds, repeats, say=_say)
+    console(120).print(tables.campaign(result))
     _write(result, json)
 
 

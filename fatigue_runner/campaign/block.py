@@ -28,6 +28,7 @@ from fatigue_runner.channels import Channel, placed
 from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.fatigue.sections import Wall
 from fatigue_runner.results.columns import DESCRIPTION
+from fatigue_runner.stopwatch import stage
 from fatigue_runner.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -70,31 +71,23 @@ def run_block(job: Job) -> list[dict[str, Any]]:
     No exception of one integrator or case ends the others: it becomes a row with the status `failed`.
     """
     rotor = _turbine(job.setup.turbine, job.setup.turbine_hash, job.setup.campaign.operation).rotor
-    winds = {case.wind: _wind(case, rotor) for case in [*job.references, *job.cases]}
+    with stage("wind"):
+        winds = {case.wind: _wind(case, rotor) for case in [*job.references, *job.cases]}
     references: dict[Any, Evaluated | None] = {}
     wanted = {case.id for case in job.cases}
     records = []
     for integration, cases in _by_integration([*job.references, *job.cases]).items():
-        for case, outcome in zip(cases, _trajectories(job, integration, cases, winds), strict=True):
-            wind = winds[case.wind]
-            reference = references.get(case.wind)
-            try:
-                if isinstance(outcome, Exception):
-                    raise outcome
-                outcome = with_sections(job.setup, outcome)
-                own = evaluate(outcome, job.setup.campaign, job.setup.walls)
-                if integration.is_reference:
-                    references[case.wind] = own if outcome.diverged_at is None else None
-                record = _finish(job, case, wind, outcome, own, reference) if case.id in wanted else None
-            except Exception as error:  # one case's trouble (a full disk, a bad wind) must not end the others
-                source = None if isinstance(wind, Exception) else wind
-                failed = _record(case, failed_row(case, source, error, job.setup.campaign, job.setup.states))
-                record = failed if case.id in wanted else None
+        outcomes = _trajectories(job, integration, cases, winds)
+        while cases:
+            # popped, so that nothing of one integrator is in memory when the next one begins
+            case, outcome = cases.pop(0), outcomes.pop(0)
+            record = _one(job, case, winds[case.wind], outcome, references, case.id in wanted)
             if record is not None:
                 records.append(record)
                 # a full disk, a folder that is gone: the record comes back with the block's
                 with suppress(OSError):
                     leave(job.setup.logs.parent, job.cases[0].id, record)
+            del outcome
     return records
 
 
@@ -121,6 +114,40 @@ def warm_up(job: Job) -> None:
                 simulate(short, found, [wind], job.initial[case.wind.id][None])
         except FatigueRunnerError:
             continue  # what is wrong shows when the cases run
+
+
+def _one(
+    job: Job,
+    case: Case,
+    wind: Any,
+    outcome: Trajectory | Exception,
+    references: dict[Any, Evaluated | None],
+    wanted: bool,
+) -> dict[str, Any] | None:
+    """The record of a case, None where it is not wanted; a reference is noted for its wind."""
+    campaign, reference = job.setup.campaign, references.get(case.wind)
+    try:
+        if isinstance(outcome, Exception):
+            raise outcome
+        with stage("loads"):
+            outcome = rounded(with_sections(job.setup, outcome), campaign.log.precision)
+        with stage("counting"):
+            own = evaluate(outcome, campaign, job.setup.walls)
+        if case.integration.is_reference:
+            references[case.wind] = own.compared if outcome.diverged_at is None else None
+        return _finish(job, case, wind, outcome, own, reference) if wanted else None
+    except Exception as error:  # one case's trouble (a full disk, a bad wind) must not end the others
+        source = None if isinstance(wind, Exception) else wind
+        failed = _record(case, failed_row(case, source, error, campaign, job.setup.states))
+        return failed if wanted else None
+
+
+def rounded(trajectory: Trajectory, precision: str) -> Trajectory:
+    """With its loads as a log of this precision holds them: what is counted in memory and what is counted from the log is the same."""
+    return dataclasses.replace(
+        trajectory,
+        loads={name: values.astype(precision, copy=False) for name, values in trajectory.loads.items()},
+    )
 
 
 def with_sections(setup: Setup, trajectory: Trajectory) -> Trajectory:
@@ -192,7 +219,7 @@ def simulate(
     turbine = _turbine(setup.turbine, setup.turbine_hash, campaign.operation)
     output_step = 1.0 / campaign.output_rate
     ensemble = integrators.Ensemble(
-        turbine, winds, initial, campaign.duration, output_step, campaign.blade_pitch
+        turbine, winds, initial, campaign.duration, output_step, campaign.blade_pitch, campaign.log.precision
     )
     return integrators.simulate(ensemble, integration.build())
 
@@ -238,18 +265,21 @@ def _finish(
     result = {name: str(value) for name, value in row.items() if value is not None and name not in said}
     error = None
     if reference is not None and not case.integration.is_reference and trajectory.diverged_at is None:
-        error = scaled_error(trajectory, reference.whole)
-    log = log_of(
-        path,
-        trajectory,
-        identity,
-        job.setup.attachments,
-        result,
-        reference_error=error,
-        compression=campaign.log.compression,
-        topics=campaign.log.topics,
-        channels=campaign.logged,
-    )
+        with stage("comparison"):
+            error = scaled_error(trajectory, reference.whole)
+    with stage("logging"):
+        log = log_of(
+            path,
+            trajectory,
+            identity,
+            job.setup.attachments,
+            result,
+            reference_error=error,
+            compression=campaign.log.compression,
+            precision=campaign.log.precision,
+            topics=campaign.log.topics,
+            channels=campaign.logged,
+        )
     return _record(case, row, log.size, log.checksum)
 
 

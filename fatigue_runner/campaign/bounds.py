@@ -14,9 +14,10 @@ from fatigue_runner.wind.section import Realisation, Site
 
 MOST_CASES = 100_000  # of one campaign: its plan and results stay in memory
 MOST_STEPS = 1e9  # of one case: hours of a core
-# memory of a block [bytes] per sample: of the vector of lanes, and of each case in it (measured; 16 states, 3 signals)
-SAMPLE, SAMPLE_OF_CASE = 4500, 550
-WANTED = 2**30  # bytes of a worker: longer cases come in smaller blocks
+# memory of a block [bytes] per sample: of the case that is evaluated, and of every case in it, its reference included (measured; 16
+# states, 3 signals)
+SAMPLE, SAMPLE_OF_CASE = 600, 420
+WANTED = 7e8  # bytes of a worker beside the program itself: longer cases come in smaller blocks
 
 
 def check_steps(campaign: Campaign, integrations: Sequence[Integration], source: Source) -> None:

@@ -49,6 +49,8 @@ def make_cases(resolved: Resolved) -> list[Case]:
         "turbine": resolved.turbine.hash,
         "watched": resolved.turbine.watched,
         **common,
+        # what its log holds of it
+        "log": campaign.log.model_dump(include={"precision", "topics", "channels"}),
     }
     of_all, of_evaluation = hashlib.sha256(_text(shared)), hashlib.sha256(_text(evaluation))
     integrations = [(found, _text(found.identity)) for found in resolved.integrations]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Any
 
@@ -19,6 +20,7 @@ from fatigue_runner.fatigue.sections import Wall
 from fatigue_runner.layout import PITCH_RATE, PITCH_RATE_LIMITED
 from fatigue_runner.results.columns import WIND, columns, damage_keys, fatigue_keys, statistics_keys
 from fatigue_runner.results.table import known
+from fatigue_runner.stopwatch import stage
 from fatigue_runner.trajectory import Trajectory
 
 
@@ -30,6 +32,15 @@ class Evaluated:
     trajectory: Trajectory
     loads: dict[tuple[str, float], float | None]
     damage: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def compared(self) -> Evaluated:
+        """What others are compared with, without the loads' series: half of the memory."""
+
+        def bare(t: Trajectory) -> Trajectory:
+            return Trajectory(t.time, t.state, np.empty((0, 0)), states=t.states)
+
+        return Evaluated(bare(self.whole), bare(self.trajectory), self.loads)
 
 
 def discarded(trajectory: Trajectory, discard: float) -> Trajectory:
@@ -56,8 +67,8 @@ def evaluate(
     """
     from fatigue_runner.fatigue import count_channels
 
-    finite = np.isfinite(trajectory.state).all(axis=1)
-    if not finite.all():
+    if not np.isfinite(np.sum(trajectory.state)) and not np.isfinite(trajectory.state).all():
+        finite = np.isfinite(trajectory.state).all(axis=1)
         when = trajectory.time[np.argmin(finite)]
         raise FatigueRunnerError(f"the state is no number from {when:g} s on, and no divergence was reported")
     kept = discarded(trajectory, campaign.discard)
@@ -119,9 +130,11 @@ def make_row(
     row["rotor_intensity"] = np.std(speed) / np.mean(speed)
     row |= own.damage
     row |= {f"del_{suffix}": own.loads[channel, m] for channel, m, suffix in _fatigue(campaign)}
-    row |= _statistics(own.trajectory) | _pitch_rate(own.trajectory)
+    with stage("statistics"):
+        row |= _statistics(own.trajectory) | _pitch_rate(own.trajectory)
     if reference is not None and not case.integration.is_reference:
-        row |= _errors(own, reference, campaign)
+        with stage("comparison"):
+            row |= _errors(own, reference, campaign)
     return {name: known(row[name]) for name in row}
 
 
@@ -130,18 +143,20 @@ def _statistics(trajectory: Trajectory) -> dict[str, Any]:
     names = [channel.name for channel in trajectory.states]
     series = dict(zip(names, trajectory.state.T, strict=True)) | trajectory.loads
     time = trajectory.time
-    functions: dict[str, Any] = {
-        "mean": np.mean,
-        "min": np.min,
-        "max": np.max,
-        "std": np.std,
-        "min_time": lambda values: time[np.argmin(values)],
-        "max_time": lambda values: time[np.argmax(values)],
+    keys = [key for key in statistics_keys(trajectory.states, trajectory.loads) if key[1] in series]
+    rows = {name: row for row, name in enumerate(dict.fromkeys(name for _, name in keys))}
+    block = np.stack([series[name] for name in rows], dtype=np.float64)
+    figures = {
+        "mean": block.mean(axis=1),
+        "min": block.min(axis=1),
+        "max": block.max(axis=1),
+        "min_time": time[block.argmin(axis=1)],
+        "max_time": time[block.argmax(axis=1)],
     }
-    keys = statistics_keys(trajectory.states, trajectory.loads)
-    return {
-        f"{name}_{channel}": functions[name](series[channel]) for name, channel in keys if channel in series
-    }
+    block -= figures["mean"][:, None]
+    figures["std"] = np.sqrt(np.einsum("ij,ij->i", block, block) / len(time))
+    plain = {figure: values.tolist() for figure, values in figures.items()}
+    return {f"{figure}_{name}": plain[figure][rows[name]] for figure, name in keys}
 
 
 def _pitch_rate(trajectory: Trajectory) -> dict[str, Any]:
@@ -167,7 +182,8 @@ def failed_row(
 def empty_row(case: Case, campaign: Campaign, states: Sequence[Channel]) -> dict[str, Any]:
     """Every column, with what is known of a case before it runs."""
     settings = campaign.fatigue
-    names = columns(campaign.counted, settings.wohler_exponents, states, settings.angles)
+    angles = tuple((place, tuple(found)) for place, found in settings.angles.items())
+    names = _columns(tuple(campaign.counted), tuple(settings.wohler_exponents), tuple(states), angles)
     row: dict[str, Any] = dict.fromkeys(names)
     return row | {
         "case_id": case.id,
@@ -177,6 +193,16 @@ def empty_row(case: Case, campaign: Campaign, states: Sequence[Channel]) -> dict
         "mode": case.integration.mode or None,
         "is_reference": case.integration.is_reference,
     }
+
+
+@lru_cache(maxsize=8)
+def _columns(
+    channels: tuple[str, ...],
+    exponents: tuple[float, ...],
+    states: tuple[Channel, ...],
+    angles: tuple[tuple[str, tuple[int, ...]], ...],
+) -> list[str]:
+    return columns(channels, exponents, states, dict(angles))
 
 
 def describe(case: Case, wind: Any, campaign: Campaign) -> dict[str, Any]:

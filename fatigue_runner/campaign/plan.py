@@ -24,7 +24,7 @@ BLOCK_SIZE = 16
 # What a kill may cost: the workers' cases that are under way are at most this share of the campaign, down to half-filled lanes.
 AT_RISK = 0.1
 # of a log: fields of a status message, head and index of a message [bytes], what compression leaves (measured)
-STATUS_FIELDS, MESSAGE_BYTES, COMPRESSED = 7, 56.0, 0.75
+STATUS_FIELDS, MESSAGE_BYTES, COMPRESSED = 7, 56.0, 0.65
 
 
 @dataclass
@@ -59,12 +59,13 @@ class Plan:
 
     @property
     def logs_are_whole(self) -> bool:
-        """Whether a log holds all that a trajectory needs to be evaluated again."""
-        return self.campaign.log.topics is None and self.campaign.log.channels is None
+        """Whether a log holds all that a trajectory needs to be evaluated again, to the bit."""
+        log = self.campaign.log
+        return log.topics is None and log.channels is None and log.precision == "float64"
 
     @property
     def log_bytes(self) -> float:
-        """About what the log of one case takes [bytes]: nine for a number and a tenth for the rest, less what compression takes off."""
+        """About what the log of one case takes [bytes]: a number and its tag, the messages' heads, less what compression takes off."""
         campaign = self.campaign
         if not campaign.log.enabled:
             return 0.0
@@ -78,7 +79,9 @@ class Plan:
         }
         fields = [count for name, count in topics.items() if name in (campaign.log.topics or topics)]
         chosen = len(campaign.log.channels or ()) or sum(fields)
-        row = 9.0 * min(chosen, sum(fields)) + MESSAGE_BYTES * len(fields)
+        row = (5.0 if campaign.log.precision == "float32" else 9.0) * min(
+            chosen, sum(fields)
+        ) + MESSAGE_BYTES * len(fields)
         return (
             campaign.duration
             * campaign.output_rate

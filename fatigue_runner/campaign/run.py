@@ -33,6 +33,7 @@ from fatigue_runner.errors import FatigueRunnerError
 from fatigue_runner.interruption import end_if_asked, exit_code_of
 from fatigue_runner.results.beyond import beyond
 from fatigue_runner.results.table import Results, read_rows
+from fatigue_runner.stopwatch import stage
 from fatigue_runner.turbine.rated import rated_rotor_speed
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ if TYPE_CHECKING:
 # (run folder, cases in all, ids of the cases of each job, workers) -> the context in which the cases run
 Watch = Callable[[Path, int, list[list[str]], int], AbstractContextManager[Any]]
 
+
+Block = Callable[[Job], list[dict[str, Any]]]
 
 LARGE = 1e9  # bytes of logs that are told before a run
 
@@ -63,18 +66,20 @@ def run_campaign(
     dask: str | None = None,
     console: Console | None = None,
     watch: Watch | None = None,
+    block: Block = run_block,
 ) -> Results:
     """Run a campaign file (or a mapping with its keys) and return the results table.
 
     out: run folder, default `runs/<name>`; finished cases found there are kept, unless `fresh`. workers:
     processes, default as the campaign says; dask: address of a scheduler instead. console: where progress is
     shown; None shows nothing. watch: called with the run folder, the number of cases, the ids of the cases of
-    each job and the number of workers; the cases run inside the context that it returns. Raises InputError before
+    each job and the number of workers; the cases run inside the context that it returns. block: what a worker of this
+    machine does with a job, for whoever measures that. Raises InputError before
     anything is written where the campaign or the folder is wrong, and CampaignInterrupted on Ctrl-C.
     """
     folder = Path(out) if out is not None else None
     try:
-        return _run_campaign(campaign, folder, workers, fresh, dask, console, watch)
+        return _run_campaign(campaign, folder, workers, fresh, dask, console, watch, block)
     except OSError as error:
         raise FatigueRunnerError(_system_error(error, folder)) from error
 
@@ -105,20 +110,23 @@ def _run_campaign(
     dask: str | None,
     console: Console | None,
     watch: Watch | None,
+    block: Block,
 ) -> Results:
     from fatigue_runner.campaign.progress import Progress
 
     started = time.perf_counter()
     with Progress(console) as progress:
-        plan = make_plan(campaign, progress.say)
+        with stage("planning"):
+            plan = make_plan(campaign, progress.say)
         for sentence in plan.notes:
             progress.note(sentence)
         folder = out if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh, [column.name for column in plan.columns])
         with nullcontext() if dask is None else Cluster(dask) as cluster:
-            simulated = _simulate(plan, store, workers or plan.campaign.workers, cluster, progress, watch)
+            simulated = _simulate(plan, store, workers or plan.campaign.workers, cluster, progress, watch, block)
         settled = not simulated and store.settled
-        results = _collect(plan, store, simulated, settled)
+        with stage("table"):
+            results = _collect(plan, store, simulated, settled)
         if plan.campaign.lifetime is not None:
             from fatigue_runner.results.lifetime import life_of
 
@@ -131,13 +139,15 @@ def _run_campaign(
 
 def _write(results: Results, store: Store, progress: Any) -> None:
     """Write the tables and the report; that they are there is remembered, so that nobody makes them again."""
-    results.write()
+    with stage("table"):
+        results.write()
     if results.life is not None:
         results.life.write(results.out)
     progress.say("writing the report")
     end_if_asked()
     try:
-        _write_report(results)
+        with stage("report"):
+            _write_report(results)
     except KeyboardInterrupt:
         dismiss_workers()
         raise
@@ -156,11 +166,18 @@ def _write_report(results: Results) -> None:
 
 
 def _simulate(
-    plan: Plan, store: Store, workers: int, cluster: Cluster | None, progress: Any, watch: Watch | None = None
+    plan: Plan,
+    store: Store,
+    workers: int,
+    cluster: Cluster | None,
+    progress: Any,
+    watch: Watch | None,
+    block: Block,
 ) -> int:
     """Run the cases that are not finished; returns how many there were."""
     progress.say("checking the reference")
-    facts = about(plan.resolved) | beside(lambda: reference_facts(plan, store.earlier))
+    with stage("check of the reference"):
+        facts = about(plan.resolved) | beside(lambda: reference_facts(plan, store.earlier))
     text = resolved_yaml(plan.resolved)
     setup = Setup(
         plan.campaign,
@@ -188,7 +205,7 @@ def _simulate(
         jobs = plan.jobs(store, setup, workers)
         pending = sum(len(job.cases) for job in jobs)
         progress.begin(len(plan.cases), len(plan.cases) - pending)
-        with _ready(plan, jobs, cluster) as run:
+        with _ready(plan, jobs, cluster, block) as run:
             progress.say("running")
             ids = [[case.id for case in job.cases] for job in jobs]
             for sentence in _before(plan, store, pending):
@@ -202,7 +219,7 @@ def _simulate(
                         raise
                     progress.note(f"{error}; what it was doing is tried once more")
                     progress.advance(store.take_in())
-                    _run_again(error, plan.jobs(store, setup, workers), workers, store, progress)
+                    _run_again(error, block, plan.jobs(store, setup, workers), workers, store, progress)
         return pending
     except KeyboardInterrupt as interrupt:
         dismiss_workers()
@@ -237,10 +254,10 @@ def _run(
 
 
 def _run_again(
-    first: WorkerEndedError, jobs: Sequence[Job], workers: int, store: Store, progress: Any
+    first: WorkerEndedError, block: Block, jobs: Sequence[Job], workers: int, store: Store, progress: Any
 ) -> None:
     try:
-        _run(run_block, jobs, workers, None, store, progress)
+        _run(block, jobs, workers, None, store, progress)
     except WorkerEndedError:
         raise WorkerEndedError(f"{first}, and so did the one that tried it again") from None
 
@@ -258,13 +275,16 @@ def _sample(jobs: Sequence[Job]) -> Job:
 
 
 @contextmanager
-def _ready(plan: Plan, jobs: Sequence[Job], cluster: Cluster | None) -> Iterator[Callable[[Job], Any]]:
+def _ready(
+    plan: Plan, jobs: Sequence[Job], cluster: Cluster | None, block: Block
+) -> Iterator[Callable[[Job], Any]]:
     """What runs a job; its kernels are compiled, where it will run, once."""
     if not jobs:
-        yield run_block
+        yield block
     elif cluster is None:
-        beside(lambda: warm_up(_sample(jobs)))
-        yield run_block
+        with stage("kernels"):
+            beside(lambda: warm_up(_sample(jobs)))
+        yield block
     else:
         with cluster.prepared(pack(plan.resolved), _sample(jobs)) as on_worker:
             yield on_worker

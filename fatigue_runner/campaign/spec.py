@@ -201,6 +201,7 @@ class Log(Section):
 
     enabled: bool = True
     compression: Literal["zstd", "lz4", "none"] = "zstd"
+    precision: Literal["float32", "float64"] = "float32"
     topics: Annotated[list[Topic], BeforeValidator(check_not_empty)] | None = None
     channels: Annotated[list[str], BeforeValidator(check_not_empty)] | None = None
 

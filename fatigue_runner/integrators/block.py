@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import stepper
 from fatigue_runner.integrators.contract import Lanes, Method, Prepared, Task
 from fatigue_runner.integrators.output import OutputPlan, plan_output
 from fatigue_runner.integrators.pitch import PitchSeries, first_pitch
+from fatigue_runner.integrators.series import Series, add_rows, make_room, make_series
 from fatigue_runner.integrators.signals import PitchCells, Signals
-from fatigue_runner.integrators.stepper import Output, room
+from fatigue_runner.integrators.stepper import Output, Place, room
+from fatigue_runner.stopwatch import stage
 from fatigue_runner.trajectory import Trajectory
 from fatigue_runner.turbine.lane_code import LANES
 from fatigue_runner.turbine.lanes import KernelData, aligned, counters, to_groups
@@ -45,38 +46,32 @@ class Block:
     pitch: float | PitchSeries
     data: KernelData
     prepared: Prepared
+    load_type: DTypeLike
 
 
 @dataclass
 class _Group:
-    """What the loop left of one group: `out` is written anew by the next; clamped, extra evaluations (LANES,); wall [s]."""
+    """What was left of one group, for its `cases` of LANES: diverged_at, clamped, extra evaluations (LANES,); wall [s]."""
 
-    out: Output
+    series: Series
+    diverged_at: Array
     clamped: NDArray[np.int64]
     extra: NDArray[np.int64]
     wall: float
 
 
-_kept = threading.local()
-_MOST_KEPT = 2**27  # bytes
 _LARGE = 2**20  # bytes
-
-
-def _output_rows(count: int, width: int) -> Array:
-    """(count, width) to write output to, the same memory again and again: a new page costs as much as a step (measured)."""
-    size = count * width
-    rows: Array | None = getattr(_kept, "rows", None)
-    if rows is None or len(rows) < size:
-        rows = np.empty(size)
-        _kept.rows = rows if rows.nbytes <= _MOST_KEPT else None
-    return rows[:size].reshape(count, width)
+# Output rows between two calls of the time loop: enough that a call costs nothing, few enough that they stay in the cache.
+_ROWS = 512
 
 
 def make_block(
     turbine: Turbine, method: Method, step: float, duration: float, output_step: float | None,
-    pitch: float | PitchSeries, corrector: Any, mode: str, harmonics: bool,
+    pitch: float | PitchSeries, corrector: Any, mode: str, harmonics: bool, load_type: DTypeLike = np.float64,
 ) -> Block:  # fmt: skip
-    """The method made ready; harmonics: whether the winds have azimuthal ones. The last step ends at or after `duration` [s].
+    """The method made ready; harmonics: whether the winds have azimuthal ones; load_type: of the load channels.
+
+    The last step ends at or after `duration` [s].
 
     Raises InputError for impossible numbers, and where method, corrector and pitch do not go together.
     """
@@ -99,7 +94,7 @@ def make_block(
     start = first_pitch(pitch)
     data = turbine.pitched_kernel_data(harmonics) if varying else turbine.kernel_data(start, harmonics)
     task = Task(turbine, data.model.layout, step, start, corrector, mode)
-    return Block(turbine, method, step, steps, plan, pitch, data, method.prepare(task))
+    return Block(turbine, method, step, steps, plan, pitch, data, method.prepare(task), load_type)
 
 
 def run_block(block: Block, winds: Sequence[WindSource], initial: Array) -> list[Trajectory]:
@@ -111,7 +106,8 @@ def run_block(block: Block, winds: Sequence[WindSource], initial: Array) -> list
     control: Any = None
     if isinstance(block.pitch, PitchSeries):
         control = PitchCells(*block.pitch.cells(block.turbine.pitch_range, block.steps * block.step))
-    cell_duration, cells = stack_cells(winds, end, layout)
+    with stage("wind"):
+        cell_duration, cells = stack_cells(winds, end, layout)
     groups = to_groups(np.ascontiguousarray(initial.T))
     # one group's cells: (n_cells, 4, signals * LANES)
     blocks = to_groups(cells.reshape(-1, len(winds))).reshape(len(groups), len(cells), 4, -1)
@@ -121,20 +117,15 @@ def run_block(block: Block, winds: Sequence[WindSource], initial: Array) -> list
         p, u = np.zeros(own.shape[2]), np.zeros(len(layout.control) * LANES)
         signals = Signals(cell_duration, aligned(own), changing, control, aligned(p), aligned(u))
         here = winds[number * LANES : (number + 1) * LANES]
-        lanes = len(here)
         # the last group is filled with copies of its last case
-        speeds = tuple(wind.mean_speed for wind in here) + (here[-1].mean_speed,) * (LANES - lanes)
-        group = _run_group(block, x, signals, speeds)
-        rows = group.out.rows.reshape(-1, layout.size, LANES)
-        states = np.ascontiguousarray(rows.transpose(2, 0, 1)[:lanes])
-        for lane in range(lanes):
-            out.append(_trajectory(block, here[lane], states[lane], group, lane, lanes))
+        speeds = tuple(wind.mean_speed for wind in here) + (here[-1].mean_speed,) * (LANES - len(here))
+        group = _run_group(block, x, signals, speeds, len(here))
+        out += [_trajectory(block, wind, group, lane) for lane, wind in enumerate(here)]
     return out
 
 
-def _run_group(block: Block, x: Array, signals: Signals, speeds: tuple[float, ...]) -> _Group:
-    from numba import typeof
-
+def _run_group(block: Block, x: Array, signals: Signals, speeds: tuple[float, ...], cases: int) -> _Group:
+    """Advance the group from x (width,) in pieces, so that memory does not grow with what the kernel writes for all of LANES."""
     plan, data, size = block.plan, block.data, block.data.model.layout.size
     # a lane that is no number would stay so: it runs on from rest, its result is not used
     fine = np.isfinite(x.reshape(size, LANES)).all(axis=0)
@@ -142,73 +133,102 @@ def _run_group(block: Block, x: Array, signals: Signals, speeds: tuple[float, ..
     clamped = aligned(counters())
     # tables of a varying pitch are large, and aligned from the start
     tables = aligned(data.tables) if data.tables.nbytes < _LARGE else data.tables
-    intervals = len(plan.time) - 1
+    n, rows = len(plan.time), min(_ROWS, len(plan.time)) + plan.most_in_a_step
     out = Output(
-        rows=_output_rows(len(plan.time), len(x)),
-        accepted=np.ones((intervals, LANES), np.bool_),
-        discrepancy=np.full((intervals, LANES), np.nan),
-        errors=np.full((intervals, LANES), np.nan),
+        rows=aligned(np.empty((rows, len(x)))),
+        accepted=np.ones((rows, LANES), np.bool_),
+        discrepancy=np.full((rows, LANES), np.nan),
+        errors=np.full((rows, LANES), np.nan),
         diverged_at=np.where(fine, -1.0, 0.0),
     )
     method = block.prepared.arrays(Lanes(start, signals, speeds), aligned)
-    arguments = (
-        method, data.model, block.step, block.steps, signals, data.arrays(clamped)._replace(tables=tables),
-        room(start, block.prepared.slopes, 1 << (size - 1).bit_length(), aligned), plan.arrays, out,
-    )  # fmt: skip
-    run: Any = stepper.run  # a dispatcher, which no type checker sees
-    types = tuple(typeof(argument) for argument in arguments)
-    if types not in run.overloads:
-        # a process compiles a loop once, or loads it from the cache: that is no time of the integration
-        run.compile(types)
-    begin = clock()
-    run(*arguments)
-    wall = clock() - begin
-    # the loops note a step's figures once, in the row of its first output
-    noted = np.searchsorted(plan.step[1:], plan.step[1:])
-    told = out._replace(
-        accepted=out.accepted[noted], discrepancy=out.discrepancy[noted], errors=out.errors[noted]
+    ring = room(start, block.prepared.slopes, 1 << (size - 1).bit_length(), aligned)
+    place = Place(np.zeros(1, np.int64), np.ones(1, np.int64))
+    channels, winds, of_loads = (
+        len(data.model.generated.LOADS),
+        len(signals.p) // LANES,
+        data.load_arrays(counters()),
     )
-    out.rows[0] = x
+    series, own_room = (
+        make_series(cases, n, size, winds, channels, block.load_type),
+        make_room(size, winds, channels, aligned),
+    )
+    arrays = data.arrays(clamped)._replace(tables=tables)
+    run, lay_out = stepper.run, add_rows
+    begin, first, gone, wall = 0, 1, False, 0.0
+    while begin < block.steps and not gone:
+        # up to the step after which the rows are full, with all outputs that are known by then
+        last = min(first + _ROWS, n) - 1
+        end = block.steps if last == n - 1 else int(plan.step[last])
+        known = int(np.searchsorted(plan.step, end, side="right"))
+        part = plan.part(first - 1, known + 1)
+        place.output[0] = 1
+        steps = (
+            method, data.model, block.step, begin, end, signals, arrays, ring, place, part, out,
+        )  # fmt: skip
+        if begin == 0:
+            _compile(run, steps)
+        started = clock()
+        with stage("integration"):
+            gone = run(*steps)
+        wall += clock() - started
+        new = 1
+        if begin == 0:
+            out.rows[0], new = x, 0
+        written = (
+            data.model, plan.time, first - 1 + new, new, int(place.output[0]), part, out, signals,
+            of_loads, own_room, series,
+        )  # fmt: skip
+        if begin == 0:
+            _compile(lay_out, written)
+        with stage("loads"):
+            lay_out(*written)
+        begin, first = end, known
     extra = counters() if block.prepared.extra is None else block.prepared.extra(method)
-    return _Group(told, clamped, extra, wall)
+    return _Group(series, out.diverged_at, clamped, extra, wall)
 
 
-def _trajectory(
-    block: Block, wind: WindSource, state: Array, group: _Group, lane: int, lanes: int
-) -> Trajectory:
-    plan, step, steps, out = block.plan, block.step, block.steps, group.out
-    n, diverged_at = len(plan.time), float(out.diverged_at[lane])
+def _compile(function: Any, arguments: tuple[Any, ...]) -> None:
+    """Compile for these arguments, or load it from the cache, as a process does once: that is no time of the integration."""
+    from numba import typeof
+
+    types = tuple(typeof(argument) for argument in arguments)
+    if types not in function.overloads:
+        function.compile(types)
+
+
+def _trajectory(block: Block, wind: WindSource, group: _Group, lane: int) -> Trajectory:
+    plan, step, steps, series = block.plan, block.step, block.steps, group.series
+    n, diverged_at = len(plan.time), float(group.diverged_at[lane])
     if diverged_at >= 0:
         # outputs between two step ends need both: the last one that does not lie after the last good step end
         n = max(int(np.searchsorted(plan.time, diverged_at - step * (1 - 1e-9))), 1)
         steps = round(diverged_at / step)
-    limit = block.prepared.limit
-    # copies: a slice would keep the whole block's memory alive
-    time_points, own = plan.time[:n].copy(), state[:n].copy()
-    error, distance = out.errors[: n - 1, lane].copy(), out.discrepancy[: n - 1, lane].copy()
-    signals, turbine = wind.at(time_points), block.turbine
+    limit, layout, turbine = block.prepared.limit, block.data.model.layout, block.turbine
+    time_points, own = plan.time[:n].copy(), series.state[lane, :, :n].T
     pitch = block.pitch.at(time_points) if isinstance(block.pitch, PitchSeries) else block.pitch
-    loads = turbine.loads(own, signals, pitch, wind.channels)
-    layout = block.data.model.layout
+    named = dict(zip(block.data.model.generated.LOADS, series.loads[lane, :, :n], strict=True))
+    loads = turbine.completed(named, own, pitch)
+    blown = series.wind[lane, layout.wind_rows(wind.channels), :n].T
     seen = () if turbine.controller is None else turbine.controller.seen
     return Trajectory(
         time=time_points,
         state=own,
-        wind=signals,
+        wind=blown,
         loads=loads,
-        accepted=out.accepted[: n - 1, lane].copy(),
-        discrepancy=np.full(n - 1, np.nan) if np.isnan(limit) else distance,
-        threshold=np.full(n - 1, limit),
-        local_error=error,
+        accepted=series.accepted[lane, : n - 1],
+        discrepancy=np.broadcast_to(np.nan, n - 1) if np.isnan(limit) else series.discrepancy[lane, : n - 1],
+        threshold=np.broadcast_to(limit, n - 1),
+        local_error=series.errors[lane, : n - 1],
         steps=steps,
         evaluations=block.prepared.evaluations(steps) + int(group.extra[lane]),
         clamped_lookups=int(group.clamped[lane]),
-        wall_time=group.wall / lanes,
+        wall_time=group.wall / len(series.state),
         diverged_at=diverged_at if diverged_at >= 0 else None,
-        states=block.data.model.layout.states,
+        states=layout.states,
         wind_signals=wind.channels,
         pitch=loads["blade_pitch"],
-        control={name: own[:, layout.row(name)].copy() for name in layout.names[2 * layout.freedoms :]}
+        control={name: own[:, layout.row(name)] for name in layout.names[2 * layout.freedoms :]}
         | turbine.observed(own),
         control_signals=seen,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.integrators.block import Block, make_block, run_block
@@ -81,7 +81,8 @@ class Ensemble:
     """Cases of one turbine that share duration and output: n winds, each with its state at t = 0.
 
     initial (n, size of the turbine's layout); duration, output_step [s] (None: output at every step); pitch [rad]: a number or a
-    PitchSeries, the same for all. Winds need not share a time grid: `simulate` groups them. A wind that depends on the turbine's size
+    PitchSeries, the same for all; load_type: of the kernel's load channels, float32 for half the memory. Winds need not share a time
+    grid: `simulate` groups them. A wind that depends on the turbine's size
     is made for this one.
     Raises InputError where the shapes do not fit.
     """
@@ -92,6 +93,7 @@ class Ensemble:
     duration: float
     output_step: float | None = None
     pitch: float | PitchSeries = 0.0
+    load_type: DTypeLike = np.float64
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "winds", [wind.on(self.turbine.rotor) for wind in self.winds])
@@ -131,7 +133,8 @@ def simulate(ensemble: Ensemble, integrator: Integrator) -> list[Trajectory]:
         harmonics = e.turbine.layout.beyond(winds[0].channels)
         if harmonics not in blocks:
             blocks[harmonics] = make_block(
-                e.turbine, found, integrator.step, e.duration, e.output_step, e.pitch, integrator.corrector, integrator.mode, harmonics
+                e.turbine, found, integrator.step, e.duration, e.output_step, e.pitch, integrator.corrector, integrator.mode, harmonics,
+                e.load_type,
             )  # fmt: skip
         runs = run_block(blocks[harmonics], winds, initial[chosen])
         for i, trajectory in zip(chosen, runs, strict=True):

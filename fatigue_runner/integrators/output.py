@@ -19,10 +19,11 @@ Array = NDArray[np.float64]
 
 
 class PlanArrays(NamedTuple):
-    """What the compiled loop reads of an `OutputPlan`."""
+    """What the compiled loop reads of an `OutputPlan`, or of a part of it."""
 
     step: NDArray[np.int64]
     exact: NDArray[np.bool_]
+    line: NDArray[np.int64]
     position: Array
     velocity: Array
     first_order: Array
@@ -30,22 +31,32 @@ class PlanArrays(NamedTuple):
 
 @dataclass(frozen=True)
 class OutputPlan:
-    """time (n,) [s]; `step` (n,) the step after which each output is known (0: the start); `exact` where it is the step's end.
+    """time (n,) [s]; `step` (n,) the step after which each output is known (0: the start); `exact` where it is the step's end; `line` (n,)
+    of the weights, which outputs at equal places within their steps share.
 
-    position, velocity (n, 9): weights of q, h q', h^2 q'' at the ends n-1, n, n+1 (node by node) for q and for h q';
-    first_order (n, 6): of x, h x' for a first-order state x.
+    position, velocity (lines, 9): weights of q, h q', h^2 q'' at the ends n-1, n, n+1 (node by node) for q and for h q';
+    first_order (lines, 6): of x, h x' for a first-order state x.
     """
 
     time: Array
     step: NDArray[np.int64]
     exact: NDArray[np.bool_]
+    line: NDArray[np.int64]
     position: Array
     velocity: Array
     first_order: Array
 
     @property
-    def arrays(self) -> PlanArrays:
-        return PlanArrays(self.step, self.exact, self.position, self.velocity, self.first_order)
+    def most_in_a_step(self) -> int:
+        """Outputs that become known with one step, at most."""
+        return int(np.unique(self.step, return_counts=True)[1].max())
+
+    def part(self, begin: int, end: int) -> PlanArrays:
+        """The outputs from number `begin` to before `end`."""
+        own = slice(begin, end)
+        return PlanArrays(
+            self.step[own], self.exact[own], self.line[own], self.position, self.velocity, self.first_order
+        )
 
 
 @lru_cache(maxsize=4096)
@@ -78,24 +89,26 @@ def plan_output(
     nearest = np.rint(place)
     exact = np.abs(place - nearest) < 1e-6
     number = np.where(exact, nearest, np.ceil(place)).astype(np.int64)
-    position, velocity, first = (np.zeros((len(time), width)) for width in (9, 9, 6))
     three = order > 4 and steps > 1
+    waiting = np.zeros(len(time), bool)
     if three and np.any((number == 1) & ~exact):
         # the first step's outputs wait for the second step's end, to have three step ends; so its own end must wait, too, and is
-        # then the one before the newest: weight 1 on its value and on its slope
-        at_end = (number == 1) & exact
-        position[at_end, 3] = velocity[at_end, 4] = first[at_end, 2] = 1.0
+        # then the one before the newest
         waiting = number == 1
         number[waiting] = 2
-    else:
-        waiting = np.zeros(len(time), bool)
-    for i in np.flatnonzero(~exact):
-        # theta is rounded so that equal places of different steps share their weights
-        theta = round(float(place[i] - (number[i] - 1)), 9)
-        nodes = (-1.0, 0.0, 1.0) if three else (0.0, 1.0)
-        q, v = hermite_weights(theta, nodes)
+    # theta is rounded so that equal places of different steps share their weights
+    theta = np.round(place - (number - 1), 9)
+    at_end, exact = exact & waiting, exact & ~waiting
+    theta[at_end], theta[exact] = 0.0, 1.0
+    places, line = np.unique(theta, return_inverse=True)
+    nodes = (-1.0, 0.0, 1.0) if three else (0.0, 1.0)
+    position, velocity, first = (np.zeros((len(places), width)) for width in (9, 9, 6))
+    for i, found in enumerate(places.tolist()):
+        if found == 0.0:  # the first step's end, which waits
+            position[i, 3] = velocity[i, 4] = first[i, 2] = 1.0
+            continue
+        q, v = hermite_weights(round(found, 9), nodes)
         position[i, 9 - len(q) :], velocity[i, 9 - len(v) :] = q, v
-        x = hermite_weights(theta, nodes, 2)[0]
+        x = hermite_weights(round(found, 9), nodes, 2)[0]
         first[i, 6 - len(x) :] = x
-    exact &= ~waiting
-    return OutputPlan(time, number, exact, position, velocity, first)
+    return OutputPlan(time, number, exact, line.astype(np.int64), position, velocity, first)

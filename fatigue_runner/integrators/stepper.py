@@ -73,14 +73,27 @@ def note(method, model, ring, out, interval):
     raise NotImplementedError("compiled code only")
 
 
+class Place(NamedTuple):
+    """Where a run is between two calls of `run`, one number each (1,): row of the newest step end in the rings, next output."""
+
+    now: NDArray[np.int64]
+    output: NDArray[np.int64]
+
+
 @njit(**LEAN)
-def run(method, model, h, steps, signals, data, ring, plan, out):
-    """Advance one group by `steps` steps of size h [s]; plan: `output.PlanArrays`. It ends early when all lanes have diverged."""
-    now, output, gone = 0, 1, False
-    keep(model, ring.restart, out.rows, 0)
-    signals_at(model, 0.0, signals)
-    begin(method, model, h, signals, data, ring)
-    for n in range(steps):
+def run(method, model, h, begin_step, end_step, signals, data, ring, place, plan, out):
+    """Advance one group from step `begin_step` (0: the start) to `end_step`, of size h [s]; returns whether all lanes have diverged, so
+    that it ended early.
+
+    plan: `output.PlanArrays` of the outputs that become known on the way, behind one more, the last that was known before, as
+    are the rows of `out`; place.output is 1 at the beginning, and the number of rows that are written at the end.
+    """
+    now, output, gone = place.now[0], place.output[0], False
+    if begin_step == 0:
+        keep(model, ring.restart, out.rows, 0)
+        signals_at(model, 0.0, signals)
+        begin(method, model, h, signals, data, ring)
+    for n in range(begin_step, end_step):
         new = (now + 1) % 3
         if not advance(method, model, n, h, now, new, signals, data, ring):
             gone = mark_diverged(model, ring.current, (n + 1) * h, out.diverged_at, ring.restart)
@@ -97,6 +110,8 @@ def run(method, model, h, steps, signals, data, ring, plan, out):
             note(method, model, ring, out, first - 1)
         if gone:
             break
+    place.now[0], place.output[0] = now, output
+    return gone
 
 
 def room(start: Array, slopes: int, padded: int, aligned: object) -> Ring:

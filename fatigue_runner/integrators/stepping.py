@@ -187,15 +187,15 @@ def write_output(model, output, plan, h, states, k, newest, rows):
     states (3, width), slopes k (.., width): rings of three step ends, `newest` the last; plan: `output.PlanArrays`.
     """
     n0, n1, n2 = (newest + 1) % 3, (newest + 2) % 3, newest
-    o, half = output, freedoms(model) * LANES
+    o, line, half = output, plan.line[output], freedoms(model) * LANES
     if plan.exact[o]:
         for m in range(width(model)):
             rows[o, m] = states[n2, m]
     else:
         w = plan.position
-        a0, a1, a2 = w[o, 0], w[o, 1] * h, w[o, 2] * h * h
-        b0, b1, b2 = w[o, 3], w[o, 4] * h, w[o, 5] * h * h
-        c0, c1, c2 = w[o, 6], w[o, 7] * h, w[o, 8] * h * h
+        a0, a1, a2 = w[line, 0], w[line, 1] * h, w[line, 2] * h * h
+        b0, b1, b2 = w[line, 3], w[line, 4] * h, w[line, 5] * h * h
+        c0, c1, c2 = w[line, 6], w[line, 7] * h, w[line, 8] * h * h
         for m in range(half):
             rows[o, m] = (
                 (a0 * states[n0, m] + a1 * states[n0, half + m] + a2 * k[n0, half + m])
@@ -203,9 +203,9 @@ def write_output(model, output, plan, h, states, k, newest, rows):
                 + (c0 * states[n2, m] + c1 * states[n2, half + m] + c2 * k[n2, half + m])
             )
         w = plan.velocity
-        a0, a1, a2 = w[o, 0] / h, w[o, 1], w[o, 2] * h
-        b0, b1, b2 = w[o, 3] / h, w[o, 4], w[o, 5] * h
-        c0, c1, c2 = w[o, 6] / h, w[o, 7], w[o, 8] * h
+        a0, a1, a2 = w[line, 0] / h, w[line, 1], w[line, 2] * h
+        b0, b1, b2 = w[line, 3] / h, w[line, 4], w[line, 5] * h
+        c0, c1, c2 = w[line, 6] / h, w[line, 7], w[line, 8] * h
         for m in range(half):
             rows[o, half + m] = (
                 (a0 * states[n0, m] + a1 * states[n0, half + m] + a2 * k[n0, half + m])
@@ -214,8 +214,8 @@ def write_output(model, output, plan, h, states, k, newest, rows):
             )
         if first_order(model) > 0:
             w = plan.first_order
-            a0, a1, b0 = w[o, 0], w[o, 1] * h, w[o, 2]
-            b1, c0, c1 = w[o, 3] * h, w[o, 4], w[o, 5] * h
+            a0, a1, b0 = w[line, 0], w[line, 1] * h, w[line, 2]
+            b1, c0, c1 = w[line, 3] * h, w[line, 4], w[line, 5] * h
             for m in range(2 * half, width(model)):
                 rows[o, m] = (
                     (a0 * states[n0, m] + a1 * k[n0, m])

@@ -96,7 +96,7 @@ def columns(
             raise LogError(f"unknown load channel {name!r}{did_you_mean(name, channels.LOAD_NAMES)}")
         if np.shape(values) != (rows,):
             raise LogError(f"load {name} to log has shape {np.shape(values)}; it must be ({rows},)")
-        loads[name] = np.asarray(values, float)
+        loads[name] = values
     found = {
         "status": _status(block, extra or {}, rows, first_row),
         "state": _table(block.state, [c.name for c in block.states], "state", rows),
@@ -112,11 +112,13 @@ def topics_of(
     keys: Iterable[str] | None,
     names: Iterable[str] | None,
     run: Trajectory,
+    precision: str = "float64",
 ) -> tuple[Topic, ...]:
     """The topics, in row order and with the fields that are available, that a log keeps.
 
     keys: topics asked for, None for what is there; names: channels asked for, None for all (status is not a
-    matter of channels); run: whose states and wind signals they are. Raises LogError for a topic or channel that
+    matter of channels); run: whose states and wind signals they are; precision: of their numbers.
+    Raises LogError for a topic or channel that
     is asked for and not there.
     """
     kept = [t for t in select_topics(keys) if keys is not None or t.key in available]
@@ -139,7 +141,7 @@ def topics_of(
             fields &= set(names)
         if fields - {"time"}:
             whole = t.with_sections(sections) if t.key == "loads" else t.of(own[t.key]) if t.key in own else t
-            found.append(whole.only(fields))
+            found.append(whole.only(fields).at(precision))
     if [t.key for t in found] == ["status"]:
         raise LogError(
             "cannot log the status alone: it has no row for the first time; add state, loads or wind"

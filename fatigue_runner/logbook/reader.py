@@ -71,7 +71,8 @@ def chunk_tables(layout: RowLayout, rows: np.ndarray, first_row: int) -> Tables:
     for t in layout.topics:
         records = rows[t.key][1:] if t.key == "status" and first_row == 0 else rows[t.key]
         names = ("_log_time", "_sequence", *t.field_names)
-        tables[t.key] = {name: np.ascontiguousarray(records[name]) for name in names}
+        kinds = {f.name: np.float64 for f in t.fields if f.kind == "float"}
+        tables[t.key] = {name: np.ascontiguousarray(records[name], kinds.get(name)) for name in names}
         if "accepted" in tables[t.key]:
             tables[t.key]["accepted"] = tables[t.key]["accepted"] != 0
     return tables

@@ -26,13 +26,19 @@ PACKAGE = "fatigue_runner"
 
 _PROTO = descriptor_pb2.FieldDescriptorProto
 # kind: (protobuf type, wire type, numpy type). Each takes the same number of bytes whatever its value,
-# which is what lets a chunk be one structured array: doubles and fixed32 by definition, a bool as a
+# which is what lets a chunk be one structured array: doubles, floats and fixed32 by definition, a bool as a
 # one-byte varint.
 KINDS: dict[str, tuple[int, int, str]] = {
     "double": (_PROTO.TYPE_DOUBLE, 1, "<f8"),
+    "float": (_PROTO.TYPE_FLOAT, 5, "<f4"),
     "bool": (_PROTO.TYPE_BOOL, 0, "u1"),
     "fixed32": (_PROTO.TYPE_FIXED32, 5, "<u4"),
 }
+
+
+# name in a campaign -> kind of the numbers
+PRECISIONS = {"float64": "double", "float32": "float"}
+GROWING = {"time", *(f"{name}_azimuth" for name in ("rotor", "generator"))}
 
 
 @dataclass(frozen=True)
@@ -79,6 +85,18 @@ class Topic:
         """The same topic with `time` and those fields that are named."""
         wanted = {"time", *names}
         return replace(self, fields=tuple(f for f in self.fields if f.name in wanted))
+
+    def at(self, precision: str) -> Topic:
+        """The same topic with numbers of `precision`, a key of `PRECISIONS`. Time and azimuths, which grow for as long as the turbine
+        turns, are doubles in any case: after ten minutes a float would have the generator's to 4e-3 rad."""
+        kind = PRECISIONS[precision]
+        return replace(
+            self,
+            fields=tuple(
+                replace(f, kind=kind) if f.kind == "double" and f.name not in GROWING else f
+                for f in self.fields
+            ),
+        )
 
     def of(self, signals: Sequence[channels.Channel]) -> Topic:
         """The same topic of these signals, which begin with its own and may end with the wind's harmonics."""
@@ -168,6 +186,11 @@ def fields_in(data: bytes, name: str) -> tuple[Field, ...] | None:
     return None
 
 
+def _allowed(field: Field) -> set[str]:
+    """Kinds that a field may have in a log."""
+    return {field.kind, "float"} if field.kind == "double" and field.name not in GROWING else {field.kind}
+
+
 @lru_cache(maxsize=256)
 def known_topic(topic_name: str, schema_name: str, data: bytes) -> Topic | None:
     """The topic that a log of ours declares, with its fields; None for one of a later version.
@@ -185,7 +208,7 @@ def known_topic(topic_name: str, schema_name: str, data: bytes) -> Topic | None:
     numbers = {f.number: f for f in by_topic.fields}
     for f in fields:
         known = names.get(f.name)
-        if known is not numbers.get(f.number) or (known and known.kind != f.kind):
+        if known is not numbers.get(f.number) or (known and f.kind not in _allowed(known)):
             raise LogError(f"the schema of topic {topic_name!r} is damaged at field {f.name!r}")
     units = {f.name: f.unit for f in by_topic.fields}
     found = replace(by_topic, fields=tuple(replace(f, unit=units.get(f.name, "-")) for f in fields))

@@ -21,13 +21,14 @@ import numpy as np
 from mcap.records import Attachment, Channel, Schema
 
 from fatigue_runner.channels import WIND_NAMES
+from fatigue_runner.errors import did_you_mean
 from fatigue_runner.logbook.columns import columns, topics_of
 from fatigue_runner.logbook.compression import compressor
 from fatigue_runner.logbook.container import Container, as_entries, as_text, library_name
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.files import open_exclusively, part_of, publish, write_errors
 from fatigue_runner.logbook.layout import RowLayout, layout_for
-from fatigue_runner.logbook.schema import SCHEMA_VERSION, descriptor_set, select_topics
+from fatigue_runner.logbook.schema import PRECISIONS, SCHEMA_VERSION, descriptor_set, select_topics
 from fatigue_runner.trajectory import Trajectory
 
 CHUNK_SIZE = 1 << 20
@@ -42,7 +43,8 @@ class LogWriter:
                 log.append(block)
             log.result["status"] = "done"
 
-    run, attachments: written first (name -> bytes for the latter). compression: "zstd", "lz4" or "none".
+    run, attachments: written first (name -> bytes for the latter). compression: "zstd", "lz4" or "none". precision: "float64", which
+    reads back to the bit, or "float32", half of the bytes (times and azimuths stay doubles).
     topics: keys of `schema.TOPICS`; channels: names of states, wind signals and loads; None keeps all that
     the first block has. A chunk is closed when it holds `chunk_size` bytes, or at the first `append` after
     `chunk_seconds` of wall time, and is then visible to whoever tails `<path>.part`. `result` is written
@@ -58,6 +60,7 @@ class LogWriter:
         run: Mapping[str, Any] | None = None,
         attachments: Mapping[str, bytes] | None = None,
         compression: str = "zstd",
+        precision: str = "float64",
         topics: Iterable[str] | None = None,
         channels: Iterable[str] | None = None,
         chunk_size: int = CHUNK_SIZE,
@@ -65,6 +68,9 @@ class LogWriter:
         sync: bool = True,
     ) -> None:
         self._compression, self._compress = compressor(compression)
+        if precision not in PRECISIONS:
+            raise LogError(f"unknown log precision {precision!r}{did_you_mean(precision, PRECISIONS)}")
+        self._precision = precision
         self._topic_keys = None if topics is None else [t.key for t in select_topics(topics)]
         self._channels = None if channels is None else list(channels)
         self.path = Path(path)
@@ -130,7 +136,9 @@ class LogWriter:
         extra = {"reference_error": reference_error, "clamped_lookups": clamped_lookups}
         values = columns(block, extra, self.rows)
         if self._layout is None:
-            self._begin(layout_for(topics_of(values, self._topic_keys, self._channels, block)))
+            self._begin(
+                layout_for(topics_of(values, self._topic_keys, self._channels, block, self._precision))
+            )
         self._refuse_missing(values)
         with self._writing():
             self._write_rows(values, log_time)
@@ -232,7 +240,11 @@ class LogWriter:
         if self._layout is None:
             # no row tells how many harmonics the wind has
             topics = [t for t in select_topics(self._topic_keys) if len(t.fields) > 1]
-            self._begin(layout_for(tuple(t.only(WIND_NAMES) if t.key == "wind" else t for t in topics)))
+            self._begin(
+                layout_for(
+                    tuple((t.only(WIND_NAMES) if t.key == "wind" else t).at(self._precision) for t in topics)
+                )
+            )
         with self._writing():
             self._close_chunk()
             self._container.metadata("result", self._full_result())
@@ -274,6 +286,7 @@ def log_of(
     reference_error: np.ndarray | None = None,
     clamped_lookups: np.ndarray | None = None,
     compression: str = "zstd",
+    precision: str = "float64",
     topics: Iterable[str] | None = None,
     channels: Iterable[str] | None = None,
     sync: bool = True,
@@ -290,6 +303,7 @@ def log_of(
         run=run,
         attachments=attachments,
         compression=compression,
+        precision=precision,
         topics=topics,
         channels=channels,
         chunk_seconds=float("inf"),

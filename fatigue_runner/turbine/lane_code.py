@@ -310,22 +310,23 @@ class _Emitter:
             row = rows[0]
             columns = [self.splat(b.extract_element(row, _INDEX(i)), 1) for i in range(VECTOR)]
         else:
-            columns = self.transposed(rows)
+            columns = transposed(b, rows)
         for name, i in self.column.items():
             if i // VECTOR == block:
                 self.values[name] = columns[i % VECTOR]
 
-    def transposed(self, rows: list[Any]) -> list[Any]:
-        """VECTOR rows -> VECTOR columns by butterflies: at each distance the halves of two rows change places."""
-        distance = 1
-        while distance < VECTOR:
-            low = [i if not i & distance else VECTOR + i - distance for i in range(VECTOR)]
-            high = [i + distance if not i & distance else VECTOR + i for i in range(VECTOR)]
-            masks = [ir.Constant(ir.VectorType(_INDEX, VECTOR), m) for m in (low, high)]
-            out = list(rows)
-            for i in range(VECTOR):
-                if not i & distance:
-                    pair = rows[i], rows[i + distance]
-                    out[i], out[i + distance] = (self.builder.shuffle_vector(*pair, mask) for mask in masks)
-            rows, distance = out, 2 * distance
-        return rows
+
+def transposed(builder: Any, rows: list[Any]) -> list[Any]:
+    """VECTOR rows -> VECTOR columns by butterflies: at each distance the halves of two rows change places."""
+    distance = 1
+    while distance < VECTOR:
+        low = [i if not i & distance else VECTOR + i - distance for i in range(VECTOR)]
+        high = [i + distance if not i & distance else VECTOR + i for i in range(VECTOR)]
+        masks = [ir.Constant(ir.VectorType(_INDEX, VECTOR), m) for m in (low, high)]
+        out = list(rows)
+        for i in range(VECTOR):
+            if not i & distance:
+                pair = rows[i], rows[i + distance]
+                out[i], out[i + distance] = (builder.shuffle_vector(*pair, mask) for mask in masks)
+        rows, distance = out, 2 * distance
+    return rows

@@ -48,11 +48,9 @@ def _evaluate(model: Any, x: Array, wind: Array, control: Array, data: KernelArr
 
 
 @njit(nogil=True)
-def _load_groups(
-    model: Any, x: Array, wind: Array, control: Array, derivative: Array, data: KernelArrays, out: Array
-) -> None:
+def _load_groups(model: Any, x: Array, wind: Array, control: Array, data: KernelArrays, out: Array) -> None:
     for group in range(x.shape[0]):
-        loads(model, x[group], wind[group], control[group], derivative[group], out[group], 0, data)
+        loads(model, x[group], wind[group], control[group], out[group], 0, data)
 
 
 def to_groups(columns: Array) -> Array:
@@ -107,8 +105,6 @@ def load_channels(
     names, n = data.model.generated.LOADS, len(state)
     x, p = to_groups(np.ascontiguousarray(state.T)), to_groups(np.ascontiguousarray(wind.T))
     u = to_groups(np.ascontiguousarray(_controls(None if control is None else control.T, n)))
-    derivative, clamped = np.empty_like(x), counters()
     out = np.empty((len(x), len(names) * LANES))
-    _evaluate(data.model, x, p, u, data.arrays(clamped), derivative)
-    _load_groups(data.model, x, p, u, derivative, data.load_arrays(clamped), out)
+    _load_groups(data.model, x, p, u, data.load_arrays(counters()), out)
     return dict(zip(names, np.ascontiguousarray(from_groups(out, len(names), n)), strict=True))

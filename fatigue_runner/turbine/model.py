@@ -149,26 +149,24 @@ def rhs(model, x, wind, control, out, start, data):
     _rhs(model, x, wind, control, out, start, data)
 
 
-def _loads(model, x, wind, control, derivative, out, start, data):
+def _loads(model, x, wind, control, out, start, data):
     raise NotImplementedError("compiled code only")
 
 
 @overload(_loads, inline="always")
-def _loads_of_model(model, x, wind, control, derivative, out, start, data):
+def _loads_of_model(model, x, wind, control, out, start, data):
     kernel = model.model.generated.loads
 
-    def call(model, x, wind, control, derivative, out, start, data):
-        kernel(
-            x, wind, control, derivative, out, start, data.tables, data.cells, data.constants, data.clamped
-        )
+    def call(model, x, wind, control, out, start, data):
+        kernel(x, wind, control, out, start, data.tables, data.cells, data.constants, data.clamped)
 
     return call
 
 
 @njit(**INLINE)
-def loads(model, x, wind, control, derivative, out, start, data):
-    """out[start:] = load channels (k, LANES) of states with their derivatives; else as `rhs`."""
-    _loads(model, x, wind, control, derivative, out, start, data)
+def loads(model, x, wind, control, out, start, data):
+    """out[start:] = load channels (k, LANES) of states, with the accelerations of the equations; else as `rhs`."""
+    _loads(model, x, wind, control, out, start, data)
 
 
 def _prefix(family: str) -> str:

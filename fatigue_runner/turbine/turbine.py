@@ -311,11 +311,14 @@ class Turbine:
 
         x = np.asarray(state, float)
         data, rows, control = self._driven(x, wind, pitch, signals)
-        found = load_channels(data, x, rows, control)
-        mechanical = found["generator_torque"] * x[:, self.layout.generator_speed]
-        return found | {
+        return self.completed(load_channels(data, x, rows, control), x, pitch)
+
+    def completed(self, loads: dict[str, Array], state: Array, pitch: ArrayLike = 0.0) -> dict[str, Array]:
+        """The kernel's load channels of states (n, k) with those that are made of them: power and blade pitch."""
+        mechanical = loads["generator_torque"] * state[:, self.layout.generator_speed]
+        return loads | {
             "generator_power": self.generator_efficiency * mechanical,
-            "blade_pitch": self.turned(x, pitch),
+            "blade_pitch": self.turned(state, pitch),
         }
 
     def turned(self, state: Array, pitch: ArrayLike = 0.0) -> Array:

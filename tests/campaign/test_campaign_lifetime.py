@@ -41,21 +41,24 @@ def test_a_campaign_with_a_climate_writes_its_life(world, tmp_path):
     row = next(r for r in loads if r["is_reference"] == "True" and r["channel"] == channel)
     assert float(row["lifetime_del"]) == pytest.approx(by_hand, rel=1e-12)
     rk4 = next(r for r in loads if r["method"] == "rk4" and r["channel"] == channel)
-    assert float(rk4["error"]) == pytest.approx(0.1**4, rel=1e-6)
+    assert float(rk4["error"]) == pytest.approx(
+        0.1**4, rel=1e-3
+    )  # loads are counted as single precision holds them
     damage = read(tmp_path / "out" / "damage.csv")
     assert len(damage) == 4 * 24 and {r["place"] for r in damage} == {"tower_base"}
     assert float(damage[0]["damage"]) > 0
 
 
 def test_another_climate_needs_no_new_simulation_and_another_curve_only_a_new_count(world, tmp_path):
-    run_campaign(write_campaign(tmp_path, lifetime=LIFE), tmp_path / "out")
+    exact = {"log": "{precision: float64}"}
+    run_campaign(write_campaign(tmp_path, lifetime=LIFE, **exact), tmp_path / "out")
     before = len(world.calls)
     again = run_campaign(
-        write_campaign(tmp_path, lifetime="{climate: {weibull: {mean: 7}}}"), tmp_path / "out"
+        write_campaign(tmp_path, lifetime="{climate: {weibull: {mean: 7}}}", **exact), tmp_path / "out"
     )
     assert again.simulated == 0 and len(world.calls) == before
     assert again.life.climate.name == "Weibull, mean 7 m/s, shape 2"
-    counted = run_campaign(write_campaign(tmp_path, lifetime=LIFE, fatigue=DAMAGE), tmp_path / "out")
+    counted = run_campaign(write_campaign(tmp_path, lifetime=LIFE, fatigue=DAMAGE, **exact), tmp_path / "out")
     assert counted.simulated == 12 and len(world.calls) == before  # evaluated anew from the logs
     assert counted.life.places == ("tower_base",)
 

@@ -8,8 +8,10 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from logbook_example import example
 from mcap.opcode import Opcode
@@ -19,10 +21,10 @@ from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 from fatigue_runner import channels
-from fatigue_runner.logbook import read_log
+from fatigue_runner.logbook import LogError, check, read_log, write_log
 from fatigue_runner.logbook.generic import message_class
 from fatigue_runner.logbook.records import walk
-from fatigue_runner.logbook.schema import TOPICS, descriptor_set, fields_in
+from fatigue_runner.logbook.schema import TOPICS, descriptor_set, fields_in, known_topic
 
 
 def test_the_librarys_seeking_reader_accepts_it_with_checksums(log_path):
@@ -235,3 +237,33 @@ def test_schemas_are_flat_proto3_that_protobuf_itself_accepts():
         message = message_class(Schema(1, data, "protobuf", topic.schema_name))
         assert [f.name for f in message.DESCRIPTOR.fields] == list(topic.field_names)
         assert all(f.message_type is None for f in message.DESCRIPTOR.fields)
+
+
+def test_single_precision_is_a_proto_float_and_rounds_all_that_does_not_grow(tmp_path):
+    run = example(500)
+    run.state[:, channels.STATE_NAMES.index("generator_azimuth")] += 7e4  # ten minutes of it
+    path = write_log(tmp_path / "single.mcap", run, precision="float32")
+    whole = write_log(tmp_path / "double.mcap", run)
+    assert path.stat().st_size < 0.75 * whole.stat().st_size
+    with open(path, "rb") as stream:
+        decoded = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages())
+    thrust = [d.decoded_message.rotor_thrust for d in decoded if d.channel.topic == "/turbine/loads"]
+    assert thrust == run.loads["rotor_thrust"].astype(np.float32).tolist()
+    log = read_log(path)
+    assert log.state.dtype == log.wind.dtype == log.loads["rotor_thrust"].dtype == np.float64
+    assert log.time.tobytes() == run.time.tobytes()
+    for number, name in enumerate(channels.STATE_NAMES):
+        own = run.state[:, number]
+        expected = own if name.endswith("azimuth") else own.astype(np.float32)
+        assert np.array_equal(log[name], expected, equal_nan=True), name
+    assert np.array_equal(log.discrepancy, run.discrepancy.astype(np.float32), equal_nan=True)
+    assert check(path).problems == []
+    with pytest.raises(LogError, match="unknown log precision 'float16'; did you mean"):
+        write_log(tmp_path / "half.mcap", run, precision="float16")
+
+
+def test_a_schema_that_makes_an_azimuth_a_float_is_damaged(tmp_path):
+    azimuth = replace(TOPICS["state"].only(["rotor_azimuth"]).fields[1], kind="float")
+    topic = replace(TOPICS["state"], fields=(azimuth,))
+    with pytest.raises(LogError, match="damaged at field 'rotor_azimuth'"):
+        known_topic(topic.name, topic.schema_name, descriptor_set(topic))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -311,5 +311,46 @@ def live(result: dict[str, Any]) -> Any:
         "ratio: of the clock, to the unwatched runs of the same round; CPU, waited: the run's processes together; slower: by "
         "waiting, at most; watching: share of all cores that bridge and viewer took. "
         f"Slower by at most {result['slower']:.1%}"
+    )
+    return made
+
+
+def campaign(result: dict[str, Any]) -> Any:
+    """The figures of `speed.campaign.measure` as a rich table."""
+    from rich.table import Table as RichTable
+
+    from fatigue_runner.benchmark.speed.campaign import FIXED, OPENFAST, REST, STAGES
+
+    situations, one = result["situations"], result["evaluation"]
+    made = RichTable(
+        title=f"A campaign of {situations[0]['cases']} cases of {result['duration']:g} s at 50 Hz"
+    )
+    made.add_column("us per simulated second and case, on one core")
+    for s in situations:
+        made.add_column(
+            f"{'logs' if s['logged'] else 'no logs'}, {s['workers']} process{'es' * (s['workers'] > 1)}",
+            justify="right",
+        )
+
+    def line(name: str, values: Iterable[float], digits: int = 2) -> None:
+        made.add_row(name, *(f"{value:.{digits}f}" for value in values))
+
+    for stage in (*STAGES, REST):
+        line(stage, (s["stages"][stage] for s in situations))
+    made.add_section()
+    line("together", (s["sum"] for s in situations))
+    line("of the core, waits included", (s["core"] for s in situations))
+    line("in evaluations of the kernel", (s["core"] * 1e3 / one for s in situations), 0)
+    line(
+        f"times OpenFAST's {OPENFAST:g} times real time", (1e6 / s["core"] / OPENFAST for s in situations), 0
+    )
+    made.add_section()
+    for name in FIXED:
+        line(f"{name}, s", (s["fixed"][name] for s in situations))
+    line("the whole run, s", (s["whole"] for s in situations))
+    line("a log, MB", (s["log_bytes_per_case"] / 1e6 for s in situations))
+    made.caption = (
+        f"one evaluation of the kernel: {one:.1f} ns in the same runs; before the run the program starts in {result['start']:.2f} s; "
+        "rk4 at 100 ms and, as the reference, at 50 ms"
     )
     return made

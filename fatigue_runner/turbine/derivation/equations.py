@@ -446,7 +446,7 @@ def harmonic_symbols(name: str) -> list[sp.Symbol]:
     return [sp.Symbol(f"{name}_{weight}", real=True) for weight in ("mean", "cos", "sin")]
 
 
-def harmonic_sums(sheet: Sheet, rates_only: bool = False) -> None:
+def harmonic_sums(sheet: Sheet) -> None:
     """Mean, cosine and sine part over the rotor of the blades' own deflections, rates and products: x_i = mean + cos cos_i + sin sin_i."""
     x = sheet.states
     f, fd, e, ed = ([of(i, k) for i in (1, 2, 3)] for of in (x.flap, x.edge) for k in (0, 1))
@@ -474,7 +474,7 @@ def harmonic_sums(sheet: Sheet, rates_only: bool = False) -> None:
             "dg": times(fd, ed),
             "gg": times(ed, ed),
         }
-    for name in [n for n in products if n in "dg"] if rates_only else products:
+    for name in products:
         one, two, three = (sheet.let(f"{name}_of_{i + 1}", x) for i, x in enumerate(products[name]))
         mean, cosine, sine = harmonic_symbols(name)
         sheet.lines.append((mean, (one + (two + three)) / 3))
@@ -1013,10 +1013,19 @@ def tower_and_nacelle(sheet: Sheet, top: Motion) -> tuple[dict[str, sp.Expr], di
     return mass, force
 
 
-def accelerations(
-    states: States = T2B1I1CG, harmonics: bool = False, controlled: bool = False
-) -> tuple[Sheet, tuple[sp.Expr, ...]]:
-    """The whole model: a sheet of assignments, and the accelerations; harmonics: see `inflow`; controlled: `generator_torque`."""
+@dataclass
+class Moved:
+    """The whole model: a sheet of assignments, the motions and the flow that the loads depend on as well, and the accelerations."""
+
+    sheet: Sheet
+    top: Motion
+    hub: Motion
+    aero: Aerodynamics
+    accelerations: tuple[sp.Expr, ...]
+
+
+def accelerations(states: States = T2B1I1CG, harmonics: bool = False, controlled: bool = False) -> Moved:
+    """The equations of motion, solved; harmonics: see `inflow`; controlled: `generator_torque`."""
     sheet = Sheet(states)
     top = tower_top(sheet)
     m = hub(sheet, top)
@@ -1070,7 +1079,7 @@ def accelerations(
     generator = (twist * share - torque) * sheet.constant(1 / P["g_i"])
     generator += sheet.constant(P["g_rigid"] * P["g_ratio"]) * result["p"]
     result |= {"phi": result["p"], "gen": sheet.let("x_gen", generator)}
-    return sheet, tuple(result[name] for name in states.coordinates)
+    return Moved(sheet, top, m, aero, tuple(result[name] for name in states.coordinates))
 
 
 def flap_forces(sheet: Sheet, m: Motion, aero: Aerodynamics) -> dict[str, sp.Expr]:
@@ -1308,12 +1317,11 @@ def from_blade(v, number: int) -> sp.Matrix:
 def load_channels(
     states: States = T2B1I1CG, harmonics: bool = False, controlled: bool = False
 ) -> tuple[Sheet, dict[str, sp.Expr]]:
-    """Loads by their channel names from states, wind and accelerations; harmonics and controlled as in `accelerations`."""
-    sheet = Sheet(states)
-    harmonic_sums(sheet, rates_only=True)
-    top = tower_top(sheet)
-    m = hub(sheet, top)
-    aero = inflow(sheet, m, harmonics)
+    """Loads by their channel names from states and wind, on the sheet of their accelerations, whose flow and look-ups they share;
+    harmonics and controlled as in `accelerations`."""
+    moved = accelerations(states, harmonics, controlled)
+    sheet, top, m, aero = moved.sheet, moved.top, moved.hub, moved.aero
+    sheet.lines += zip(states.symbols(2), moved.accelerations, strict=True)
     phidd = states.of("phi", 2)
     rotating = full_motion(m, sheet, "hub", phidd)
     out: dict[str, sp.Expr] = {}

@@ -207,7 +207,6 @@ def kernel(
     variant: Variant,
     sheet: eq.Sheet,
     outputs: dict[int, sp.Expr],
-    derivative: bool,
     tables,
     constants,
 ) -> str:
@@ -215,9 +214,6 @@ def kernel(
     wanted: set[sp.Symbol] = set().union(*(e.free_symbols for e in outputs.values()))
     lines = schedule(used_only(sheet.lines, wanted | {eq.TIP_SPEED_RATIO}), "u")
     inputs = variant.inputs
-    if derivative:
-        first = variant.layout.freedoms
-        inputs |= {s: f"derivative[{first + i}]" for i, s in enumerate(variant.states.symbols(2))}
     inputs[eq.HALF_SQRT3] = repr(3**0.5 / 2)
     inputs |= {c: f"constants[{i}]" for i, c in enumerate(constants)}
     phi = variant.states.of("phi")
@@ -241,7 +237,7 @@ def kernel(
     for i, expr in outputs.items():
         write(f"out[{i}]", expr)
     upper, width = f"{name.upper()}_CODE", len(tables)
-    names = ("x", "wind", "control", *(["derivative"] if derivative else []), "out")
+    names = ("x", "wind", "control", "out")
     arguments, arrays = "".join(f"{a}, " for a in names), ", ".join(repr(a) for a in names)
     places = f"place={str(eq.TIP_SPEED_RATIO)!r}" + (
         f", second={str(PITCH)!r}" if variant.varying_pitch else ""
@@ -286,10 +282,11 @@ def module(variant: Variant) -> str:
     """A generated module: its head, the constants, and the kernels `rhs` and `loads`."""
     layout = variant.layout
     controlled = variant.controller is not None
-    sheet, accelerations = eq.accelerations(variant.states, layout.harmonics, controlled)
+    moved = eq.accelerations(variant.states, layout.harmonics, controlled)
+    sheet = moved.sheet
     load_sheet, loads = eq.load_channels(variant.states, layout.harmonics, controlled)
     out = dict(enumerate(variant.states.symbols(1))) | {
-        layout.freedoms + i: a for i, a in enumerate(accelerations)
+        layout.freedoms + i: a for i, a in enumerate(moved.accelerations)
     }
     load_out = {i: loads[n] for i, n in enumerate(EQUATION_LOADS)}
     if variant.varying_pitch:
@@ -315,9 +312,9 @@ def module(variant: Variant) -> str:
     )
     kernels = [
         kernel("rhs", f"State derivative of LANES cases: x, out[start:] in blocks {sizes}.",
-               variant, sheet, out, False, tables, symbols),
-        kernel("loads", f"Load channels of LANES states: x, derivative {sizes}, out (k, LANES).",
-               variant, load_sheet, load_out, True, variant.tables, symbols),
+               variant, sheet, out, tables, symbols),
+        kernel("loads", f"Load channels of LANES states: x {sizes}, out (k, LANES).",
+               variant, load_sheet, load_out, variant.tables, symbols),
     ]  # fmt: skip
     head = HEAD.format(
         doc=variant.doc, source=variant.source, parameters=repr(variant.parameters), tables=repr(variant.tables),

@@ -294,18 +294,168 @@ def constants(parameters):
     l0 = cos_tilt*overhang
     l1 = tower_to_shaft + overhang*sin_tilt
     l2 = (0.3333333333333333)*q_area
-    l3 = (1.0/g_ratio)
-    l4 = g_ratio*g_rigid/g_efficiency
-    l5 = g_i*(g_ratio*g_ratio)*g_rigid/g_efficiency
-    l6 = 3.0*cos_cone
-    l7 = (0.5)*b_fxfx - (0.5)*b_fyfy
-    l8 = (0.5)*b_fxfx + (0.5)*b_fyfy
-    l9 = (0.5)*b_exex - (0.5)*b_eyey
-    l10 = (0.5)*b_exex + (0.5)*b_eyey
-    l11 = (0.5)*b_fxex - (0.5)*b_fyey
-    l12 = (0.5)*b_fxey + (0.5)*b_fyex
-    l13 = (0.5)*b_fxex + (0.5)*b_fyey
-    l14 = (0.5)*b_fxey - (0.5)*b_fyex
+    l3 = (1.5)*b_see*sin_cone
+    l4 = 3.0*b_sfe*sin_cone
+    l5 = 3.0*b_ex*cos_cone
+    l6 = 3.0*b_ey*cos_cone
+    l7 = 3.0*b_fx*cos_cone
+    l8 = 3.0*b_fy*cos_cone
+    l9 = (1.5)*b_sff*sin_cone
+    l10 = 3.0*b_m1*sin_cone
+    l11 = (1.5)*b_sfe*cos_cone
+    l12 = (1.5)*b_fy
+    l13 = (1.5)*b_fx
+    l14 = (1.5)*b_fx*sin_cone
+    l15 = (1.5)*b_fy*sin_cone
+    l16 = (0.75)*b_sff*cos_cone
+    l17 = 6.0*b_sfe*sin_cone
+    l18 = 3.0*b_sff*sin_cone
+    l19 = 3.0*b_see*sin_cone
+    l20 = 3.0*b_sfe*cos_cone
+    l21 = (1.5)*b_sff*cos_cone
+    l22 = 3.0*b_fxey*sin_cone - 3.0*b_fyex*sin_cone
+    l23 = 3.0*b_rey*cos_cone
+    l24 = 3.0*b_rex*cos_cone
+    l25 = (1.5)*b_fxey*cos_cone - (1.5)*b_fyex*cos_cone
+    l26 = 3.0*b_rfy*cos_cone
+    l27 = 3.0*b_rfx*cos_cone
+    l28 = (1.5)*b_rfx
+    l29 = (1.5)*b_rfy
+    l30 = (1.5)*b_rfy*sin_cone
+    l31 = (1.5)*b_rfx*sin_cone
+    l32 = (1.5)*b_exex*(cos_cone*cos_cone) - (1.5)*b_eyey*(cos_cone*cos_cone)
+    l33 = 3.0*b_exey*(cos_cone*cos_cone)
+    l34 = (1.5)*b_exex*(cos_cone*cos_cone) + 3.0*b_exex*(sin_cone*sin_cone) + (1.5)*b_eyey*(cos_cone*cos_cone) + 3.0*b_eyey*(sin_cone*sin_cone) - 3.0*b_rsee*(cos_cone*cos_cone)
+    l35 = 3.0*b_fxex*(cos_cone*cos_cone) - 3.0*b_fyey*(cos_cone*cos_cone)
+    l36 = 3.0*b_fxey*(cos_cone*cos_cone) + 3.0*b_fyex*(cos_cone*cos_cone)
+    l37 = 3.0*b_fxex*(cos_cone*cos_cone) + 6.0*b_fxex*(sin_cone*sin_cone) + 3.0*b_fyey*(cos_cone*cos_cone) + 6.0*b_fyey*(sin_cone*sin_cone) - 6.0*b_rsfe*(cos_cone*cos_cone)
+    l38 = 6.0*b_rex*cos_cone*sin_cone
+    l39 = 6.0*b_rey*cos_cone*sin_cone
+    l40 = 6.0*b_rfx*cos_cone*sin_cone
+    l41 = 6.0*b_rfy*cos_cone*sin_cone
+    l42 = (1.5)*b_fxfx*(cos_cone*cos_cone) - (1.5)*b_fyfy*(cos_cone*cos_cone)
+    l43 = 3.0*b_fxfy*(cos_cone*cos_cone)
+    l44 = (1.5)*b_fxfx*(cos_cone*cos_cone) + 3.0*b_fxfx*(sin_cone*sin_cone) + (1.5)*b_fyfy*(cos_cone*cos_cone) + 3.0*b_fyfy*(sin_cone*sin_cone) - 3.0*b_rsff*(cos_cone*cos_cone)
+    l45 = 3.0*b_m2*(cos_cone*cos_cone)
+    l46 = (1.5)*b_fxey*cos_cone + (1.5)*b_fyex*cos_cone
+    l47 = (1.5)*b_fxex*cos_cone - (1.5)*b_fyey*cos_cone
+    l48 = (1.5)*b_fxex*cos_cone*sin_cone - (1.5)*b_fyey*cos_cone*sin_cone
+    l49 = (1.5)*b_fxey*cos_cone*sin_cone + (1.5)*b_fyex*cos_cone*sin_cone
+    l50 = (1.5)*b_fxex*cos_cone*sin_cone + (1.5)*b_fyey*cos_cone*sin_cone + 3.0*b_rsfe*cos_cone*sin_cone
+    l51 = (1.5)*b_rfx*(cos_cone*cos_cone) - (1.5)*b_rfx*(sin_cone*sin_cone)
+    l52 = (1.5)*b_rfy*(cos_cone*cos_cone) - (1.5)*b_rfy*(sin_cone*sin_cone)
+    l53 = (1.5)*b_fxfy*cos_cone
+    l54 = (0.75)*b_fxfx*cos_cone - (0.75)*b_fyfy*cos_cone
+    l55 = (0.75)*b_fxfx*cos_cone*sin_cone - (0.75)*b_fyfy*cos_cone*sin_cone
+    l56 = (1.5)*b_fxfy*cos_cone*sin_cone
+    l57 = (0.75)*b_fxfx*cos_cone*sin_cone + (0.75)*b_fyfy*cos_cone*sin_cone + (1.5)*b_rsff*cos_cone*sin_cone
+    l58 = (1.5)*b_fxey*sin_cone + (1.5)*b_fyex*sin_cone
+    l59 = (1.5)*b_fxex*sin_cone - (1.5)*b_fyey*sin_cone
+    l60 = (0.75)*b_fxex*(sin_cone*sin_cone) + (0.75)*b_fxex - (0.75)*b_fyey*(sin_cone*sin_cone) - (0.75)*b_fyey
+    l61 = (0.75)*b_fxey*(sin_cone*sin_cone) + (0.75)*b_fxey + (0.75)*b_fyex*(sin_cone*sin_cone) + (0.75)*b_fyex
+    l62 = (1.5)*b_fxex*(cos_cone*cos_cone) + (0.75)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fyey*(cos_cone*cos_cone) + (0.75)*b_fyey*(sin_cone*sin_cone) + (1.5)*b_rsfe - (0.75)*b_fxex - (0.75)*b_fyey - (1.5)*b_rsfe*(sin_cone*sin_cone)
+    l63 = (1.5)*b_rfy*cos_cone
+    l64 = (1.5)*b_rfx*cos_cone
+    l65 = (1.5)*b_rfx*cos_cone*sin_cone
+    l66 = (1.5)*b_rfy*cos_cone*sin_cone
+    l67 = (1.5)*b_fxfy*sin_cone
+    l68 = (0.75)*b_fxfx*sin_cone - (0.75)*b_fyfy*sin_cone
+    l69 = (0.375)*b_fxfx*(sin_cone*sin_cone) + (0.375)*b_fxfx - (0.375)*b_fyfy*(sin_cone*sin_cone) - (0.375)*b_fyfy
+    l70 = (0.75)*b_fxfy*(sin_cone*sin_cone) + (0.75)*b_fxfy
+    l71 = (0.75)*b_fxfx*(cos_cone*cos_cone) + (0.375)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fyfy*(cos_cone*cos_cone) + (0.375)*b_fyfy*(sin_cone*sin_cone) + (0.75)*b_rsff - (0.375)*b_fxfx - (0.375)*b_fyfy - (0.75)*b_rsff*(sin_cone*sin_cone)
+    l72 = (0.75)*b_exex*(sin_cone*sin_cone) + (0.75)*b_eyey - (0.75)*b_exex - (0.75)*b_eyey*(sin_cone*sin_cone)
+    l73 = (1.5)*b_exey*(sin_cone*sin_cone) - (1.5)*b_exey
+    l74 = (1.5)*b_exex*(cos_cone*cos_cone) + (0.75)*b_exex*(sin_cone*sin_cone) + (0.75)*b_exex + (1.5)*b_eyey*(cos_cone*cos_cone) + (0.75)*b_eyey*(sin_cone*sin_cone) + (0.75)*b_eyey - (1.5)*b_rsee*(sin_cone*sin_cone) - (1.5)*b_rsee
+    l75 = (1.5)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fyey - (1.5)*b_fxex - (1.5)*b_fyey*(sin_cone*sin_cone)
+    l76 = (1.5)*b_fxey*(sin_cone*sin_cone) + (1.5)*b_fyex*(sin_cone*sin_cone) - (1.5)*b_fxey - (1.5)*b_fyex
+    l77 = 3.0*b_fxex*(cos_cone*cos_cone) + (1.5)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fxex + 3.0*b_fyey*(cos_cone*cos_cone) + (1.5)*b_fyey*(sin_cone*sin_cone) + (1.5)*b_fyey - 3.0*b_rsfe*(sin_cone*sin_cone) - 3.0*b_rsfe
+    l78 = 3.0*b_rex*cos_cone*sin_cone
+    l79 = 3.0*b_rey*cos_cone*sin_cone
+    l80 = 3.0*b_rfx*cos_cone*sin_cone
+    l81 = 3.0*b_rfy*cos_cone*sin_cone
+    l82 = (0.75)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fyfy - (0.75)*b_fxfx - (0.75)*b_fyfy*(sin_cone*sin_cone)
+    l83 = (1.5)*b_fxfy*(sin_cone*sin_cone) - (1.5)*b_fxfy
+    l84 = (1.5)*b_fxfx*(cos_cone*cos_cone) + (0.75)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fxfx + (1.5)*b_fyfy*(cos_cone*cos_cone) + (0.75)*b_fyfy*(sin_cone*sin_cone) + (0.75)*b_fyfy - (1.5)*b_rsff*(sin_cone*sin_cone) - (1.5)*b_rsff
+    l85 = (1.5)*b_m2*(sin_cone*sin_cone) + (1.5)*b_m2
+    l86 = h_m + 3.0*b_m
+    l87 = 3.0*b_fxey*cos_cone - 3.0*b_fyex*cos_cone
+    l88 = 6.0*b_fxey*sin_cone - 6.0*b_fyex*sin_cone
+    l89 = gravity*t_gfa - t_ka
+    l90 = gravity*t_gss - t_ks
+    l91 = 3.0*cos_cone
+    l92 = (1.0/g_ratio)
+    l93 = g_ratio*g_rigid/g_efficiency
+    l94 = g_i*(g_ratio*g_ratio)*g_rigid/g_efficiency
+    l95 = b_fxfx + b_fyfy
+    l96 = b_fxex + b_fyey
+    l97 = 3.0*b_exex + 3.0*b_eyey
+    l98 = b_sfe*sin_cone
+    l99 = b_fx*cos_cone
+    l100 = b_fy*cos_cone
+    l101 = b_fxey*sin_cone - b_fyex*sin_cone
+    l102 = b_rfy*cos_cone
+    l103 = b_rfx*cos_cone
+    l104 = b_sfe*cos_cone
+    l105 = b_fx*sin_cone
+    l106 = b_fy*sin_cone
+    l107 = b_fxey*cos_cone - b_fyex*cos_cone
+    l108 = b_rfy*sin_cone
+    l109 = b_rfx*sin_cone
+    l110 = b_sff*sin_cone
+    l111 = b_sff*cos_cone
+    l112 = (0.5)*b_fxex*(cos_cone*cos_cone) - (0.5)*b_fyey*(cos_cone*cos_cone)
+    l113 = (0.5)*b_fxey*(cos_cone*cos_cone) + (0.5)*b_fyex*(cos_cone*cos_cone)
+    l114 = (0.5)*b_fxex*(cos_cone*cos_cone) + b_fxex*(sin_cone*sin_cone) + (0.5)*b_fyey*(cos_cone*cos_cone) + b_fyey*(sin_cone*sin_cone) - b_rsfe*(cos_cone*cos_cone)
+    l115 = b_rfx*cos_cone*sin_cone
+    l116 = b_rfy*cos_cone*sin_cone
+    l117 = (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fyey - (0.5)*b_fxex - (0.5)*b_fyey*(sin_cone*sin_cone)
+    l118 = (0.5)*b_fxey*(sin_cone*sin_cone) + (0.5)*b_fyex*(sin_cone*sin_cone) - (0.5)*b_fxey - (0.5)*b_fyex
+    l119 = b_fxex*(cos_cone*cos_cone) + (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fxex + b_fyey*(cos_cone*cos_cone) + (0.5)*b_fyey*(sin_cone*sin_cone) + (0.5)*b_fyey - b_rsfe - b_rsfe*(sin_cone*sin_cone)
+    l120 = 2.0*b_fxey*sin_cone - 2.0*b_fyex*sin_cone
+    l121 = b_fxey*cos_cone + b_fyex*cos_cone
+    l122 = b_fxex*cos_cone - b_fyey*cos_cone
+    l123 = b_fxex*cos_cone*sin_cone - b_fyey*cos_cone*sin_cone
+    l124 = b_fxey*cos_cone*sin_cone + b_fyex*cos_cone*sin_cone
+    l125 = b_fxex*cos_cone*sin_cone + b_fyey*cos_cone*sin_cone + 2.0*b_rsfe*cos_cone*sin_cone
+    l126 = b_rfx*(cos_cone*cos_cone) - b_rfx*(sin_cone*sin_cone)
+    l127 = b_rfy*(cos_cone*cos_cone) - b_rfy*(sin_cone*sin_cone)
+    l128 = b_fxey*sin_cone + b_fyex*sin_cone
+    l129 = b_fxex*sin_cone - b_fyey*sin_cone
+    l130 = (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fxex - (0.5)*b_fyey*(sin_cone*sin_cone) - (0.5)*b_fyey
+    l131 = (0.5)*b_fxey*(sin_cone*sin_cone) + (0.5)*b_fxey + (0.5)*b_fyex*(sin_cone*sin_cone) + (0.5)*b_fyex
+    l132 = b_rsfe + b_fxex*(cos_cone*cos_cone) + (0.5)*b_fxex*(sin_cone*sin_cone) + b_fyey*(cos_cone*cos_cone) + (0.5)*b_fyey*(sin_cone*sin_cone) - (0.5)*b_fxex - (0.5)*b_fyey - b_rsfe*(sin_cone*sin_cone)
+    l133 = 2.0*b_fxey*cos_cone - 2.0*b_fyex*cos_cone
+    l134 = (0.5)*b_fxfx*(cos_cone*cos_cone) - (0.5)*b_fyfy*(cos_cone*cos_cone)
+    l135 = b_fxfy*(cos_cone*cos_cone)
+    l136 = (0.5)*b_fxfx*(cos_cone*cos_cone) + b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fyfy*(cos_cone*cos_cone) + b_fyfy*(sin_cone*sin_cone) - b_rsff*(cos_cone*cos_cone)
+    l137 = (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fyfy - (0.5)*b_fxfx - (0.5)*b_fyfy*(sin_cone*sin_cone)
+    l138 = b_fxfy*(sin_cone*sin_cone) - b_fxfy
+    l139 = b_fxfx*(cos_cone*cos_cone) + (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fxfx + b_fyfy*(cos_cone*cos_cone) + (0.5)*b_fyfy*(sin_cone*sin_cone) + (0.5)*b_fyfy - b_rsff - b_rsff*(sin_cone*sin_cone)
+    l140 = 2.0*b_fxfy*cos_cone
+    l141 = b_fxfx*cos_cone - b_fyfy*cos_cone
+    l142 = b_fxfx*cos_cone*sin_cone - b_fyfy*cos_cone*sin_cone
+    l143 = 2.0*b_fxfy*cos_cone*sin_cone
+    l144 = b_fxfx*cos_cone*sin_cone + b_fyfy*cos_cone*sin_cone + 2.0*b_rsff*cos_cone*sin_cone
+    l145 = 2.0*b_fxfy*sin_cone
+    l146 = b_fxfx*sin_cone - b_fyfy*sin_cone
+    l147 = (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fxfx - (0.5)*b_fyfy*(sin_cone*sin_cone) - (0.5)*b_fyfy
+    l148 = b_fxfy + b_fxfy*(sin_cone*sin_cone)
+    l149 = b_rsff + b_fxfx*(cos_cone*cos_cone) + (0.5)*b_fxfx*(sin_cone*sin_cone) + b_fyfy*(cos_cone*cos_cone) + (0.5)*b_fyfy*(sin_cone*sin_cone) - (0.5)*b_fxfx - (0.5)*b_fyfy - b_rsff*(sin_cone*sin_cone)
+    l150 = (1.0/l95)
+    l151 = l150*l96
+    l152 = 3.0*l151*l96 - l97
+    l153 = (1.0/l152)
+    l154 = g_efficiency/g_ratio
+    l155 = (1.0/g_i)
+    l156 = g_ratio*g_rigid
+    l157 = (0.5)*b_fxfx - (0.5)*b_fyfy
+    l158 = (0.5)*b_fxfx + (0.5)*b_fyfy
+    l159 = (0.5)*b_exex - (0.5)*b_eyey
+    l160 = (0.5)*b_exex + (0.5)*b_eyey
+    l161 = (0.5)*b_fxex - (0.5)*b_fyey
+    l162 = (0.5)*b_fxey + (0.5)*b_fyex
+    l163 = (0.5)*b_fxex + (0.5)*b_fyey
+    l164 = (0.5)*b_fxey - (0.5)*b_fyex
     return np.array([
         b_m,
         b_m1,
@@ -595,6 +745,156 @@ def constants(parameters):
         l12,
         l13,
         l14,
+        l15,
+        l16,
+        l17,
+        l18,
+        l19,
+        l20,
+        l21,
+        l22,
+        l23,
+        l24,
+        l25,
+        l26,
+        l27,
+        l28,
+        l29,
+        l30,
+        l31,
+        l32,
+        l33,
+        l34,
+        l35,
+        l36,
+        l37,
+        l38,
+        l39,
+        l40,
+        l41,
+        l42,
+        l43,
+        l44,
+        l45,
+        l46,
+        l47,
+        l48,
+        l49,
+        l50,
+        l51,
+        l52,
+        l53,
+        l54,
+        l55,
+        l56,
+        l57,
+        l58,
+        l59,
+        l60,
+        l61,
+        l62,
+        l63,
+        l64,
+        l65,
+        l66,
+        l67,
+        l68,
+        l69,
+        l70,
+        l71,
+        l72,
+        l73,
+        l74,
+        l75,
+        l76,
+        l77,
+        l78,
+        l79,
+        l80,
+        l81,
+        l82,
+        l83,
+        l84,
+        l85,
+        l86,
+        l87,
+        l88,
+        l89,
+        l90,
+        l91,
+        l92,
+        l93,
+        l94,
+        l95,
+        l96,
+        l97,
+        l98,
+        l99,
+        l100,
+        l101,
+        l102,
+        l103,
+        l104,
+        l105,
+        l106,
+        l107,
+        l108,
+        l109,
+        l110,
+        l111,
+        l112,
+        l113,
+        l114,
+        l115,
+        l116,
+        l117,
+        l118,
+        l119,
+        l120,
+        l121,
+        l122,
+        l123,
+        l124,
+        l125,
+        l126,
+        l127,
+        l128,
+        l129,
+        l130,
+        l131,
+        l132,
+        l133,
+        l134,
+        l135,
+        l136,
+        l137,
+        l138,
+        l139,
+        l140,
+        l141,
+        l142,
+        l143,
+        l144,
+        l145,
+        l146,
+        l147,
+        l148,
+        l149,
+        l150,
+        l151,
+        l152,
+        l153,
+        l154,
+        l155,
+        l156,
+        l157,
+        l158,
+        l159,
+        l160,
+        l161,
+        l162,
+        l163,
+        l164,
     ], dtype=np.float64)
 
 
@@ -1369,6 +1669,165 @@ theta_s = 2.0*theta_half_cos*theta_half_sin
 theta_c = 1.0 - 2.0*(theta_half_sin*theta_half_sin)
 theta_ss = 2.0*theta_c*theta_s
 theta_cc = 1.0 - 2.0*(theta_s*theta_s)
+l5 = constants[278]
+l6 = constants[279]
+k5_turned = l5*theta_c + l6*theta_s
+l7 = constants[280]
+l8 = constants[281]
+k6_turned = l7*theta_c + l8*theta_s
+l12 = constants[285]
+l13 = constants[286]
+k10_turned = l12*theta_c - l13*theta_s
+l14 = constants[287]
+l15 = constants[288]
+k11_turned = l14*theta_c + l15*theta_s
+l23 = constants[296]
+l24 = constants[297]
+k19_turned = l23*theta_c - l24*theta_s
+l26 = constants[299]
+l27 = constants[300]
+k21_turned = l26*theta_c - l27*theta_s
+l28 = constants[301]
+l29 = constants[302]
+k22_turned = l28*theta_c + l29*theta_s
+l30 = constants[303]
+l31 = constants[304]
+k23_turned = l30*theta_c - l31*theta_s
+l32 = constants[305]
+l33 = constants[306]
+l34 = constants[307]
+k24_turned = l34 - l32*theta_cc - l33*theta_ss
+l35 = constants[308]
+l36 = constants[309]
+l37 = constants[310]
+k25_turned = l37 - l35*theta_cc - l36*theta_ss
+l38 = constants[311]
+l39 = constants[312]
+k26_turned = l38*theta_c + l39*theta_s
+l40 = constants[313]
+l41 = constants[314]
+k27_turned = l40*theta_c + l41*theta_s
+l42 = constants[315]
+l43 = constants[316]
+l44 = constants[317]
+k28_turned = l44 - l42*theta_cc - l43*theta_ss
+l46 = constants[319]
+l47 = constants[320]
+k30_turned = l46*theta_cc - l47*theta_ss
+l48 = constants[321]
+l49 = constants[322]
+l50 = constants[323]
+k31_turned = l50 + l48*theta_cc + l49*theta_ss
+l51 = constants[324]
+l52 = constants[325]
+k32_turned = l51*theta_c + l52*theta_s
+l53 = constants[326]
+l54 = constants[327]
+k33_turned = l53*theta_cc - l54*theta_ss
+l55 = constants[328]
+l56 = constants[329]
+l57 = constants[330]
+k34_turned = l57 + l55*theta_cc + l56*theta_ss
+l58 = constants[331]
+l59 = constants[332]
+k35_turned = l58*theta_cc - l59*theta_ss
+l60 = constants[333]
+l61 = constants[334]
+l62 = constants[335]
+k36_turned = l62 - l60*theta_cc - l61*theta_ss
+l63 = constants[336]
+l64 = constants[337]
+k37_turned = l63*theta_c - l64*theta_s
+l65 = constants[338]
+l66 = constants[339]
+k38_turned = l65*theta_c + l66*theta_s
+l67 = constants[340]
+l68 = constants[341]
+k39_turned = l67*theta_cc - l68*theta_ss
+l69 = constants[342]
+l70 = constants[343]
+l71 = constants[344]
+k40_turned = l71 - l69*theta_cc - l70*theta_ss
+l72 = constants[345]
+l73 = constants[346]
+l74 = constants[347]
+k41_turned = l74 - l72*theta_cc - l73*theta_ss
+l75 = constants[348]
+l76 = constants[349]
+l77 = constants[350]
+k42_turned = l77 - l75*theta_cc - l76*theta_ss
+l78 = constants[351]
+l79 = constants[352]
+k43_turned = l78*theta_c + l79*theta_s
+l80 = constants[353]
+l81 = constants[354]
+k44_turned = l80*theta_c + l81*theta_s
+l82 = constants[355]
+l83 = constants[356]
+l84 = constants[357]
+k45_turned = l84 - l82*theta_cc - l83*theta_ss
+l100 = constants[373]
+l99 = constants[372]
+k60_turned = l100*theta_s + l99*theta_c
+l102 = constants[375]
+l103 = constants[376]
+k62_turned = l102*theta_c - l103*theta_s
+l105 = constants[378]
+l106 = constants[379]
+k64_turned = l105*theta_c + l106*theta_s
+l108 = constants[381]
+l109 = constants[382]
+k66_turned = l108*theta_c - l109*theta_s
+l112 = constants[385]
+l113 = constants[386]
+l114 = constants[387]
+k69_turned = l114 - l112*theta_cc - l113*theta_ss
+l115 = constants[388]
+l116 = constants[389]
+k70_turned = l115*theta_c + l116*theta_s
+l117 = constants[390]
+l118 = constants[391]
+l119 = constants[392]
+k71_turned = l119 - l117*theta_cc - l118*theta_ss
+l121 = constants[394]
+l122 = constants[395]
+k73_turned = l121*theta_cc - l122*theta_ss
+l123 = constants[396]
+l124 = constants[397]
+l125 = constants[398]
+k74_turned = l125 + l123*theta_cc + l124*theta_ss
+l126 = constants[399]
+l127 = constants[400]
+k75_turned = l126*theta_c + l127*theta_s
+l128 = constants[401]
+l129 = constants[402]
+k76_turned = l128*theta_cc - l129*theta_ss
+l130 = constants[403]
+l131 = constants[404]
+l132 = constants[405]
+k77_turned = l132 - l130*theta_cc - l131*theta_ss
+l134 = constants[407]
+l135 = constants[408]
+l136 = constants[409]
+k79_turned = l136 - l134*theta_cc - l135*theta_ss
+l137 = constants[410]
+l138 = constants[411]
+l139 = constants[412]
+k80_turned = l139 - l137*theta_cc - l138*theta_ss
+l140 = constants[413]
+l141 = constants[414]
+k81_turned = l140*theta_cc - l141*theta_ss
+l142 = constants[415]
+l143 = constants[416]
+l144 = constants[417]
+k82_turned = l144 + l142*theta_cc + l143*theta_ss
+l145 = constants[418]
+l146 = constants[419]
+k83_turned = l145*theta_cc - l146*theta_ss
+l147 = constants[420]
+l148 = constants[421]
+l149 = constants[422]
+k84_turned = l149 - l147*theta_cc - l148*theta_ss
 b_fx = constants[3]
 b_fy = constants[4]
 b_fx_turned = b_fx*theta_c + b_fy*theta_s
@@ -1394,33 +1853,29 @@ b_tip_ey = constants[35]
 b_tip_ex_turned = b_tip_ex*theta_c + b_tip_ey*theta_s
 b_tip_ey_turned = b_tip_ey*theta_c - b_tip_ex*theta_s
 b_fxfy = constants[13]
-l7 = constants[280]
-u20 = b_fxfy*theta_ss + l7*theta_cc
-l8 = constants[281]
-b_fxfx_turned = l8 + u20
-b_fyfy_turned = l8 - u20
-b_fxfy_turned = b_fxfy*theta_cc - l7*theta_ss
+l157 = constants[430]
+u20 = b_fxfy*theta_ss + l157*theta_cc
+l158 = constants[431]
+b_fxfx_turned = l158 + u20
+b_fyfy_turned = l158 - u20
+b_fxfy_turned = b_fxfy*theta_cc - l157*theta_ss
 b_exey = constants[16]
-l9 = constants[282]
-u21 = b_exey*theta_ss + l9*theta_cc
-l10 = constants[283]
-b_exex_turned = l10 + u21
-b_eyey_turned = l10 - u21
-b_exey_turned = b_exey*theta_cc - l9*theta_ss
-l11 = constants[284]
-l12 = constants[285]
-u22 = l11*theta_cc + l12*theta_ss
-l13 = constants[286]
-b_fxex_turned = l13 + u22
-b_fyey_turned = l13 - u22
-u23 = l11*theta_ss
-l14 = constants[287]
-b_fxey_turned = l14 + l12*theta_cc - u23
-b_fyex_turned = l12*theta_cc - l14 - u23
-f1d = x[10]
-f2d = x[11]
-f3d = x[12]
-d_mean = (0.3333333333333333)*f1d + (0.3333333333333333)*f2d + (0.3333333333333333)*f3d
+l159 = constants[432]
+u21 = b_exey*theta_ss + l159*theta_cc
+l160 = constants[433]
+b_exex_turned = l160 + u21
+b_eyey_turned = l160 - u21
+b_exey_turned = b_exey*theta_cc - l159*theta_ss
+l161 = constants[434]
+l162 = constants[435]
+u22 = l161*theta_cc + l162*theta_ss
+l163 = constants[436]
+b_fxex_turned = l163 + u22
+b_fyey_turned = l163 - u22
+u23 = l161*theta_ss
+l164 = constants[437]
+b_fxey_turned = l164 + l162*theta_cc - u23
+b_fyex_turned = l162*theta_cc - l164 - u23
 a = x[0]
 t_slope_fa = constants[68]
 pitch_angle = a*t_slope_fa
@@ -1539,334 +1994,684 @@ skew_sin = (-u38) - u39
 uniform_mean = cos_tilt*w_fold_mean
 uniform_cos = cos_tilt*w_fold_cos
 uniform_sin = cos_tilt*w_fold_sin
-add = derivative[8]
-sdd = derivative[9]
+f1 = x[2]
+f2 = x[3]
+f3 = x[4]
+f_mean = (0.3333333333333333)*f1 + (0.3333333333333333)*f2 + (0.3333333333333333)*f3
+f_cos = f1 - f_mean
+half_sqrt3 = 0.8660254037844386
+u41 = (0.5)/half_sqrt3
+f_sin = u41*(f2 - f3)
+f1d = x[10]
+f2d = x[11]
+f3d = x[12]
+d_mean = (0.3333333333333333)*f1d + (0.3333333333333333)*f2d + (0.3333333333333333)*f3d
+d_cos = f1d - d_mean
+d_sin = u41*(f2d - f3d)
+u42 = (f1*f1)
+ff_of_1 = u42
+u43 = (f2*f2)
+ff_of_2 = u43
+u44 = (f3*f3)
+ff_of_3 = u44
+ff_mean = (0.3333333333333333)*ff_of_1 + (0.3333333333333333)*ff_of_2 + (0.3333333333333333)*ff_of_3
+ff_cos = ff_of_1 - ff_mean
+ff_sin = u41*(ff_of_2 - ff_of_3)
+u45 = 2.0*f1
+fd_of_1 = f1d*u45
+u46 = 2.0*f2
+fd_of_2 = f2d*u46
+u47 = 2.0*f3
+fd_of_3 = f3d*u47
+fd_mean = (0.3333333333333333)*fd_of_1 + (0.3333333333333333)*fd_of_2 + (0.3333333333333333)*fd_of_3
+fd_cos = fd_of_1 - fd_mean
+fd_sin = u41*(fd_of_2 - fd_of_3)
+u48 = (f1d*f1d)
+dd_of_1 = u48
+u49 = (f2d*f2d)
+dd_of_2 = u49
+u50 = (f3d*f3d)
+dd_of_3 = u50
+dd_mean = (0.3333333333333333)*dd_of_1 + (0.3333333333333333)*dd_of_2 + (0.3333333333333333)*dd_of_3
+dd_cos = dd_of_1 - dd_mean
+dd_sin = u41*(dd_of_2 - dd_of_3)
+e = x[5]
+l3 = constants[276]
+u51 = e*l3
+l4 = constants[277]
+rs_x_slope = k5_turned - u51 - f_mean*l4
+l10 = constants[283]
+l9 = constants[282]
+rs_x = l10 + e*rs_x_slope + f_mean*k6_turned - ff_mean*l9
+rs_x_by_e = rs_x_slope - u51
+l11 = constants[284]
+rs_y_slope = f_sin*l11
+l16 = constants[289]
+rs_y = e*rs_y_slope + f_cos*k10_turned + f_sin*k11_turned + ff_sin*l16
+rs_z_slope = -f_cos*l11
+rs_z = e*rs_z_slope + f_sin*k10_turned - f_cos*k11_turned - ff_cos*l16
+u52 = d_mean*e
+ed = x[13]
+rsd_x = d_mean*k6_turned + ed*rs_x_by_e - fd_mean*l9 - l4*u52
+u53 = e*l11
+rsd_y = d_cos*k10_turned + d_sin*k11_turned + d_sin*u53 + ed*rs_y_slope + fd_sin*l16
+rsd_z = d_sin*k10_turned + ed*rs_z_slope - d_cos*k11_turned - d_cos*u53 - fd_cos*l16
+u54 = (ed*ed)
+l17 = constants[290]
+l18 = constants[291]
+l19 = constants[292]
+rsdd_x = (-d_mean*ed*l17) - dd_mean*l18 - l19*u54
+l20 = constants[293]
+u55 = ed*l20
+l21 = constants[294]
+rsdd_y = d_sin*u55 + dd_sin*l21
+rsdd_z = (-d_cos*u55) - dd_cos*l21
+l22 = constants[295]
+rle_x = f_mean*l22 - k19_turned
+l25 = constants[298]
+rle_y = -f_sin*l25
+rle_z = f_cos*l25
+rl_x = ed*rle_x - d_mean*k21_turned - l22*u52
+u56 = d_sin*k23_turned
+u57 = e*l25
+rl_y = d_cos*k22_turned + d_sin*u57 + ed*rle_y - u56
+u58 = d_cos*k23_turned
+rl_z = u58 + d_sin*k22_turned + ed*rle_z - d_cos*u57
+u59 = e*k24_turned
+ri_xx_slope = u59 + f_mean*k25_turned - k26_turned
+l45 = constants[318]
+ri_xx = l45 + e*ri_xx_slope + ff_mean*k28_turned - f_mean*k27_turned
+ri_xx_by_e = ri_xx_slope + u59
+ri_xy_slope = (-f_cos*k30_turned) - f_sin*k31_turned
+ri_xy = e*ri_xy_slope + f_sin*k32_turned - f_cos*k23_turned - ff_cos*k33_turned - ff_sin*k34_turned
+ri_xz_slope = f_cos*k31_turned - f_sin*k30_turned
+ri_xz = e*ri_xz_slope + ff_cos*k34_turned - f_cos*k32_turned - f_sin*k23_turned - ff_sin*k33_turned
+ri_yz_slope = f_cos*k35_turned + f_sin*k36_turned
+ri_yz = e*ri_yz_slope + f_sin*k38_turned + ff_cos*k39_turned + ff_sin*k40_turned - f_cos*k37_turned
+u60 = e*k41_turned
+ri_mean_slope = k43_turned + u60 + f_mean*k42_turned
+l85 = constants[358]
+ri_mean = l85 + e*ri_mean_slope + f_mean*k44_turned + ff_mean*k45_turned
+ri_mean_by_e = ri_mean_slope + u60
+ri_difference_slope = f_sin*k35_turned - f_cos*k36_turned
+ri_difference = e*ri_difference_slope + ff_sin*k39_turned - f_cos*k38_turned - f_sin*k37_turned - ff_cos*k40_turned
+ri_yy = ri_difference + ri_mean
+ri_zz = ri_mean - ri_difference
+h_ixx = constants[44]
+rih_xx = h_ixx + ri_xx
+h_itt = constants[45]
+rih_yy = h_itt + ri_yy
+rih_zz = h_itt + ri_zz
+rid_xx = ed*ri_xx_by_e + fd_mean*k28_turned + k25_turned*u52 - d_mean*k27_turned
+rid_xy = d_sin*k32_turned + e*((-d_cos*k30_turned) - d_sin*k31_turned) + ed*ri_xy_slope - u58 - fd_cos*k33_turned - fd_sin*k34_turned
+rid_xz = e*(d_cos*k31_turned - d_sin*k30_turned) + ed*ri_xz_slope + fd_cos*k34_turned - u56 - d_cos*k32_turned - fd_sin*k33_turned
+rid_yz = d_sin*k38_turned + e*(d_cos*k35_turned + d_sin*k36_turned) + ed*ri_yz_slope + fd_cos*k39_turned + fd_sin*k40_turned - d_cos*k37_turned
+rid_mean = d_mean*k44_turned + ed*ri_mean_by_e + fd_mean*k45_turned + k42_turned*u52
+rid_difference = e*(d_sin*k35_turned - d_cos*k36_turned) + ed*ri_difference_slope + fd_sin*k39_turned - d_cos*k38_turned - d_sin*k37_turned - fd_cos*k40_turned
+rid_yy = rid_difference + rid_mean
+rid_zz = rid_mean - rid_difference
+turning_x = rid_xx*wf_x + rid_xy*won_y + rid_xz*won_z
+turning_y = rid_xy*wf_x + rid_yy*won_y + rid_yz*won_z
+turning_z = rid_xz*wf_x + rid_yz*won_y + rid_zz*won_z
+rot_whirl_x = rs_z*won_y + 2.0*rsd_x - rs_y*won_z
+rot_whirl_y = rs_x*won_z + 2.0*rsd_y - rs_z*wf_x
+rot_whirl_z = rs_y*wf_x + 2.0*rsd_z - rs_x*won_y
+rot_momentum_x = rl_x + ri_xy*won_y + ri_xz*won_z + rih_xx*wf_x
+rot_momentum_y = rl_y + ri_xy*wf_x + ri_yz*won_z + rih_yy*won_y
+rot_momentum_z = rl_z + ri_xz*wf_x + ri_yz*won_y + rih_zz*won_z
+l86 = constants[359]
+rot_force_x = rsdd_x + acc_f_s_x*l86 + rot_whirl_z*won_y + rs_z*spin_h_y - rot_whirl_y*won_z - rs_y*spin_h_z
+rot_force_y = rsdd_y + acc_f_y*l86 + rot_whirl_x*won_z + rs_x*spin_h_z - rot_whirl_z*wf_x - rs_z*spin_f_s_x
+rot_force_z = rsdd_z + acc_f_z*l86 + rot_whirl_y*wf_x + rs_y*spin_f_s_x - rot_whirl_x*won_y - rs_x*spin_h_y
+rot_moment_x = turning_x + acc_f_z*rs_y + ri_xy*spin_h_y + ri_xz*spin_h_z + rih_xx*spin_f_s_x + rot_momentum_z*won_y - acc_f_y*rs_z - rot_momentum_y*won_z
+rot_moment_y = turning_y + acc_f_s_x*rs_z + ri_xy*spin_f_s_x + ri_yz*spin_h_z + rih_yy*spin_h_y + rot_momentum_x*won_z - acc_f_z*rs_x - rot_momentum_z*wf_x
+rot_moment_z = turning_z + acc_f_y*rs_x + ri_xz*spin_f_s_x + ri_yz*spin_h_y + rih_zz*spin_h_z + rot_momentum_y*wf_x - acc_f_s_x*rs_y - rot_momentum_x*won_y
+w_xx = (wf_x*wf_x)
+u61 = wf_x*won_y
+w_xy = u61
+u62 = wf_x*won_z
+w_xz = u62
+w_yz = won_y*won_z
+w_yy = (won_y*won_y)
+w_zz = (won_z*won_z)
+u63 = (0.5)*w_yy
+u64 = (0.5)*w_zz
+w_mean = u63 + u64
+w_diff = u63 - u64
+l87 = constants[360]
+l88 = constants[361]
+h_edge = acc_f_s_x*rs_x_by_e + acc_f_y*rs_y_slope + acc_f_z*rs_z_slope + d_cos*l87*won_z + d_mean*l88*wf_x + rle_x*spin_f_s_x + rle_y*spin_h_y + rle_z*spin_h_z - d_sin*l87*won_y - ri_difference_slope*w_diff - ri_mean_by_e*w_mean - (0.5)*ri_xx_by_e*w_xx - ri_xy_slope*w_xy - ri_xz_slope*w_xz - ri_yz_slope*w_yz
+n_y = constants[50]
+n_z = constants[51]
+u65 = ta_x + n_z*wa_y - n_y*wa_z
+nac_ta_x = u65
+n_x = constants[49]
+u66 = ta_y + n_x*wa_z
+nac_ta_y = u66
+u67 = (-u31) - n_x*wa_y
+nac_ta_z = u67
+u68 = ts_y + n_z*t_slope_ss
+nac_ts_y = u68
+u69 = ts_z - n_y*t_slope_ss
+nac_ts_z = u69
+u70 = n_y*wn_x - n_x*wn_y
+u71 = n_x*wn_z - n_z*wn_x
+u72 = top_x + n_z*spin_n_y + u70*wn_y - n_y*spin_n_z - u71*wn_z
+nac_acc_x = u72
+u73 = n_z*wn_y - n_y*wn_z
+u74 = top_y + n_x*spin_n_z + u73*wn_z - u70*wn_x
+nac_acc_y = u74
+u75 = u71*wn_x - u36 - n_x*spin_n_y - u73*wn_y
+nac_acc_z = u75
+n_iyy = constants[53]
+u76 = n_iyy*u35
+n_izz = constants[54]
+u77 = n_izz*u35
+nac_moment_x = u77 - u76
+u78 = wn_x*wn_z
+n_ixx = constants[52]
+u79 = n_ixx*u78 - n_izz*u78
+nac_moment_y = u79 + n_iyy*spin_n_y
+u80 = n_iyy*u34 - n_ixx*u34
+nac_moment_z = u80 + n_izz*spin_n_z
+l91 = constants[364]
+pressure_x = l91*pressure
+pressure_yz = (1.5)*pressure
+pressure_rx = pressure_x*radius
+pressure_ryz = pressure_yz*radius
+u81 = c_thrust*relative_x + c_thrust_edge*ed
+aero_force_x = pressure_x*(u81 + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
+u82 = c_tangential_kappa*kappa_cos + c_tangential_skew*skew_cos + c_tangential_y*relative_y
+sin_cone = constants[40]
+aero_force_y = pressure_yz*(sin_cone*(c_thrust_flap*d_sin + c_thrust_kappa*kappa_sin + c_thrust_skew*skew_sin + c_thrust_w*uniform_sin + c_thrust_y*relative_z) - u82 - c_tangential_flap*d_cos - c_tangential_w*uniform_cos)
+u83 = c_thrust_kappa*kappa_cos + c_thrust_skew*skew_cos + c_thrust_y*relative_y
+aero_force_z = pressure_yz*((-c_tangential_flap*d_sin) - c_tangential_kappa*kappa_sin - c_tangential_skew*skew_sin - c_tangential_w*uniform_sin - c_tangential_y*relative_z - sin_cone*(u83 + c_thrust_flap*d_cos + c_thrust_w*uniform_cos))
+u84 = c_torque*relative_x + c_torque_edge*ed
+aero_moment_x = pressure_rx*(u84 + c_torque_flap*d_mean + c_torque_w*uniform_mean)
+u85 = c_bending_kappa*kappa_cos + c_bending_skew*skew_cos + c_bending_y*relative_y
+aero_moment_y = pressure_ryz*(u85 + c_bending_flap*d_cos + c_bending_w*uniform_cos + sin_cone*(c_torque_flap*d_sin + c_torque_kappa*kappa_sin + c_torque_skew*skew_sin + c_torque_w*uniform_sin + c_torque_y*relative_z))
+u86 = c_torque_kappa*kappa_cos + c_torque_skew*skew_cos + c_torque_y*relative_y
+aero_moment_z = pressure_ryz*(c_bending_flap*d_sin + c_bending_kappa*kappa_sin + c_bending_skew*skew_sin + c_bending_w*uniform_sin + c_bending_y*relative_z - sin_cone*(u86 + c_torque_flap*d_cos + c_torque_w*uniform_cos))
+net_force_x = aero_force_x - rot_force_x
+net_force_y = aero_force_y - rot_force_y
+net_force_z = aero_force_z - rot_force_z
+net_moment_x = aero_moment_x - rot_moment_x
+net_moment_y = aero_moment_y - rot_moment_y
+net_moment_z = aero_moment_z - rot_moment_z
+d_d = constants[60]
+d_k = constants[59]
+gen = x[7]
+gend = x[15]
+l92 = constants[365]
+l93 = constants[366]
+torque_shaft = d_d*(phid - gend*l92) + d_k*(phi - gen*l92) + l93*torque_commanded
+mom_a_x = l86*tha_s_x + rs_z*wha_y - rs_y*wha_z
+mom_a_y = l86*tha_y + rs_x*wha_z - rs_z*wha_s_x
+mom_a_z = l86*tha_z + rs_y*wha_s_x - rs_x*wha_y
+ang_a_x = ri_xy*wha_y + ri_xz*wha_z + rih_xx*wha_s_x + rs_y*tha_z - rs_z*tha_y
+ang_a_y = ri_xy*wha_s_x + ri_yz*wha_z + rih_yy*wha_y + rs_z*tha_s_x - rs_x*tha_z
+ang_a_z = ri_xz*wha_s_x + ri_yz*wha_y + rih_zz*wha_z + rs_x*tha_y - rs_y*tha_s_x
+mom_s_x = l86*ths_s_x + rs_z*whs_y - rs_y*whs_z
+mom_s_y = l86*ths_y + rs_x*whs_z - rs_z*whs_s_x
+mom_s_z = l86*ths_z + rs_y*whs_s_x - rs_x*whs_y
+ang_s_x = ri_xy*whs_y + ri_xz*whs_z + rih_xx*whs_s_x + rs_y*ths_z - rs_z*ths_y
+ang_s_y = ri_xy*whs_s_x + ri_yz*whs_z + rih_yy*whs_y + rs_z*ths_s_x - rs_x*ths_z
+ang_s_z = ri_xz*whs_s_x + ri_yz*whs_y + rih_zz*whs_z + rs_x*ths_y - rs_y*ths_s_x
+l98 = constants[371]
+c61 = e*l98 - k60_turned
+l101 = constants[374]
+c64 = k62_turned + e*l101
+l104 = constants[377]
+c67 = k64_turned + e*l104
+l107 = constants[380]
+c70 = e*l107 - k66_turned
+w_ed_x = ed*wf_x
+w_ed_y = ed*won_y
+w_ed_z = ed*won_z
+c75 = e*k69_turned - k70_turned
+c77 = k70_turned + e*k71_turned
+c80 = k66_turned + e*k73_turned
+c83 = e*k74_turned - k75_turned
+c85 = e*k76_turned - k62_turned
+c87 = k70_turned + e*k77_turned
+b_kfe = constants[29]
+l120 = constants[393]
+q_f_fixed_mean = acc_f_s_x*c61 + c64*spin_f_s_x + c75*w_xx + c77*w_mean + l120*w_ed_x + pressure*(c_flap*relative_x + c_flap_edge*ed + c_flap_w*uniform_mean) - b_kfe*e
+l133 = constants[406]
+q_f_fixed_cos = acc_f_z*c67 + c70*spin_h_z + c83*w_xz + c85*w_yz + l133*w_ed_z + pressure*(c_flap_kappa*kappa_cos + c_flap_skew*skew_cos + c_flap_w*uniform_cos + c_flap_y*relative_y) - acc_f_y*b_fy_turned - b_rfx_turned*spin_h_y - c80*w_xy - c87*w_diff
+q_f_fixed_sin = c85*w_diff + c87*w_yz + pressure*(c_flap_kappa*kappa_sin + c_flap_skew*skew_sin + c_flap_w*uniform_sin + c_flap_y*relative_z) - acc_f_y*c67 - acc_f_z*b_fy_turned - b_rfx_turned*spin_h_z - c70*spin_h_y - c80*w_xz - c83*w_xy - l133*w_ed_y
+q_f_fixed_other = q_f_fixed_mean - (0.5)*q_f_fixed_cos
+q_f_fixed_1 = q_f_fixed_cos + q_f_fixed_mean
+u87 = half_sqrt3*q_f_fixed_sin
+q_f_fixed_2 = q_f_fixed_other + u87
+q_f_fixed_3 = q_f_fixed_other - u87
+b_kf = constants[27]
+l110 = constants[383]
+q_f_by_flap_mean = acc_f_s_x*l110 + k79_turned*w_xx + k80_turned*w_mean - b_kf
+l111 = constants[384]
+q_f_by_flap_cos = acc_f_z*l111 + k82_turned*w_xz + k83_turned*w_yz - k81_turned*w_xy - k84_turned*w_diff
+q_f_by_flap_sin = k83_turned*w_diff + k84_turned*w_yz - acc_f_y*l111 - k81_turned*w_xz - k82_turned*w_xy
+q_f_by_flap_other = q_f_by_flap_mean - (0.5)*q_f_by_flap_cos
+q_f_by_flap_1 = q_f_by_flap_cos + q_f_by_flap_mean
+u88 = half_sqrt3*q_f_by_flap_sin
+q_f_by_flap_2 = q_f_by_flap_other + u88
+q_f_by_flap_3 = q_f_by_flap_other - u88
+b_df = constants[30]
+flap_damping = c_flap_flap*pressure - b_df
+q_f1 = q_f_fixed_1 + f1*q_f_by_flap_1 + f1d*flap_damping
+q_f2 = q_f_fixed_2 + f2*q_f_by_flap_2 + f2d*flap_damping
+q_f3 = q_f_fixed_3 + f3*q_f_by_flap_3 + f3d*flap_damping
+m_f_a_fixed_mean = (-c61*tha_s_x) - c64*wha_s_x
+m_f_a_fixed_cos = b_fy_turned*tha_y + b_rfx_turned*wha_y - c67*tha_z - c70*wha_z
+m_f_a_fixed_sin = b_fy_turned*tha_z + b_rfx_turned*wha_z + c67*tha_y + c70*wha_y
+m_f_a_fixed_other = m_f_a_fixed_mean - (0.5)*m_f_a_fixed_cos
+m_f_a_fixed_1 = m_f_a_fixed_cos + m_f_a_fixed_mean
+u89 = half_sqrt3*m_f_a_fixed_sin
+m_f_a_fixed_2 = m_f_a_fixed_other + u89
+m_f_a_fixed_3 = m_f_a_fixed_other - u89
+m_f_a_by_flap_mean = -l110*tha_s_x
+m_f_a_by_flap_cos = -l111*tha_z
+m_f_a_by_flap_sin = l111*tha_y
+m_f_a_by_flap_other = m_f_a_by_flap_mean - (0.5)*m_f_a_by_flap_cos
+m_f_a_by_flap_1 = m_f_a_by_flap_cos + m_f_a_by_flap_mean
+u90 = half_sqrt3*m_f_a_by_flap_sin
+m_f_a_by_flap_2 = m_f_a_by_flap_other + u90
+m_f_a_by_flap_3 = m_f_a_by_flap_other - u90
+m_f1a = m_f_a_fixed_1 + f1*m_f_a_by_flap_1
+m_f2a = m_f_a_fixed_2 + f2*m_f_a_by_flap_2
+m_f3a = m_f_a_fixed_3 + f3*m_f_a_by_flap_3
+m_f_s_fixed_mean = (-c61*ths_s_x) - c64*whs_s_x
+m_f_s_fixed_cos = b_fy_turned*ths_y + b_rfx_turned*whs_y - c67*ths_z - c70*whs_z
+m_f_s_fixed_sin = b_fy_turned*ths_z + b_rfx_turned*whs_z + c67*ths_y + c70*whs_y
+m_f_s_fixed_other = m_f_s_fixed_mean - (0.5)*m_f_s_fixed_cos
+m_f_s_fixed_1 = m_f_s_fixed_cos + m_f_s_fixed_mean
+u91 = half_sqrt3*m_f_s_fixed_sin
+m_f_s_fixed_2 = m_f_s_fixed_other + u91
+m_f_s_fixed_3 = m_f_s_fixed_other - u91
+m_f_s_by_flap_mean = -l110*ths_s_x
+m_f_s_by_flap_cos = -l111*ths_z
+m_f_s_by_flap_sin = l111*ths_y
+m_f_s_by_flap_other = m_f_s_by_flap_mean - (0.5)*m_f_s_by_flap_cos
+m_f_s_by_flap_1 = m_f_s_by_flap_cos + m_f_s_by_flap_mean
+u92 = half_sqrt3*m_f_s_by_flap_sin
+m_f_s_by_flap_2 = m_f_s_by_flap_other + u92
+m_f_s_by_flap_3 = m_f_s_by_flap_other - u92
+m_f1s = m_f_s_fixed_1 + f1*m_f_s_by_flap_1
+m_f2s = m_f_s_fixed_2 + f2*m_f_s_by_flap_2
+m_f3s = m_f_s_fixed_3 + f3*m_f_s_by_flap_3
+m_f_p_fixed_mean = -c64
+sum_a = m_f1a + m_f2a + m_f3a
+sum_s = m_f1s + m_f2s + m_f3s
+sum_q = q_f1 + q_f2 + q_f3
+l150 = constants[423]
+y_p = l150*m_f_p_fixed_mean
+b_de = constants[31]
+b_ke = constants[28]
+l151 = constants[424]
+r_e = 3.0*pressure*(c_edge*relative_x + c_edge_edge*ed + c_edge_flap*d_mean + c_edge_w*uniform_mean) - h_edge - 3.0*b_de*ed - 3.0*b_ke*e - 3.0*b_kfe*f_mean - l151*sum_q
+r_p = net_moment_x - torque_shaft - sum_q*y_p
+u93 = 3.0*y_p
+l96 = constants[369]
+s_pe = rle_x - l96*u93
+l153 = constants[426]
+l_pe = -l153*s_pe
+l94 = constants[367]
+s_pp = l94 + rih_xx - m_f_p_fixed_mean*u93
+inv_p = (1.0/(s_pp - l_pe*s_pe))
+z_p = r_p - l_pe*r_e
+l89 = constants[362]
+n_m = constants[48]
+t_da = constants[76]
+r_a = a*l89 + net_force_x*tha_s_x + net_force_y*tha_y + net_force_z*tha_z + net_moment_x*wha_s_x + net_moment_y*wha_y + net_moment_z*wha_z - ad*t_da - l150*(m_f1a*q_f1 + m_f2a*q_f2 + m_f3a*q_f3) - n_m*(nac_acc_x*nac_ta_x + nac_acc_y*nac_ta_y + nac_acc_z*nac_ta_z) - nac_moment_y*wa_y - nac_moment_z*wa_z
+s_ae = rle_x*wha_s_x + rle_y*wha_y + rle_z*wha_z + rs_x_by_e*tha_s_x + rs_y_slope*tha_y + rs_z_slope*tha_z - l151*sum_a
+l_ae = -l153*s_ae
+s_ap = ang_a_x - sum_a*y_p
+v_ap = s_ap - l_ae*s_pe
+l_ap = inv_p*v_ap
+t_maa = constants[62]
+s_aa = t_maa + ang_a_x*wha_s_x + ang_a_y*wha_y + ang_a_z*wha_z + mom_a_x*tha_s_x + mom_a_y*tha_y + mom_a_z*tha_z + n_iyy*(wa_y*wa_y) + n_izz*(wa_z*wa_z) + n_m*((nac_ta_x*nac_ta_x) + (nac_ta_y*nac_ta_y) + (nac_ta_z*nac_ta_z)) - l150*((m_f1a*m_f1a) + (m_f2a*m_f2a) + (m_f3a*m_f3a))
+inv_a = (1.0/(s_aa - l_ae*s_ae - l_ap*v_ap))
+z_a = r_a - l_ae*r_e - l_ap*z_p
+l90 = constants[363]
+t_ds = constants[77]
+r_s = l90*s + nac_moment_x*t_slope_ss + net_force_x*ths_s_x + net_force_y*ths_y + net_force_z*ths_z + net_moment_x*whs_s_x + net_moment_y*whs_y + net_moment_z*whs_z - l150*(m_f1s*q_f1 + m_f2s*q_f2 + m_f3s*q_f3) - n_m*(nac_acc_x*ts_x + nac_acc_y*nac_ts_y + nac_acc_z*nac_ts_z) - sd*t_ds
+s_se = rle_x*whs_s_x + rle_y*whs_y + rle_z*whs_z + rs_x_by_e*ths_s_x + rs_y_slope*ths_y + rs_z_slope*ths_z - l151*sum_s
+l_se = -l153*s_se
+s_sp = ang_s_x - sum_s*y_p
+v_sp = s_sp - l_se*s_pe
+l_sp = inv_p*v_sp
+s_sa = ang_s_x*wha_s_x + ang_s_y*wha_y + ang_s_z*wha_z + mom_s_x*tha_s_x + mom_s_y*tha_y + mom_s_z*tha_z + n_m*(nac_ta_x*ts_x + nac_ta_y*nac_ts_y + nac_ta_z*nac_ts_z) - l150*(m_f1a*m_f1s + m_f2a*m_f2s + m_f3a*m_f3s)
+v_sa = s_sa - l_se*s_ae - l_sp*v_ap
+l_sa = inv_a*v_sa
+t_mss = constants[63]
+s_ss = t_mss + ang_s_x*whs_s_x + ang_s_y*whs_y + ang_s_z*whs_z + mom_s_x*ths_s_x + mom_s_y*ths_y + mom_s_z*ths_z + n_ixx*(t_slope_ss*t_slope_ss) + n_m*((nac_ts_y*nac_ts_y) + (nac_ts_z*nac_ts_z) + (ts_x*ts_x)) - l150*((m_f1s*m_f1s) + (m_f2s*m_f2s) + (m_f3s*m_f3s))
+inv_s = (1.0/(s_ss - l_sa*v_sa - l_se*s_se - l_sp*v_sp))
+z_s = r_s - l_sa*z_a - l_se*r_e - l_sp*z_p
+x_s = inv_s*z_s
+x_a = inv_a*z_a - l_sa*x_s
+x_p = inv_p*z_p - l_ap*x_a - l_sp*x_s
+x_e = (-l153*r_e) - l_ae*x_a - l_pe*x_p - l_se*x_s
+x_common = l96*x_e + m_f_p_fixed_mean*x_p
+x_f1 = l150*(q_f1 - x_common - m_f1a*x_a - m_f1s*x_s)
+x_f2 = l150*(q_f2 - x_common - m_f2a*x_a - m_f2s*x_s)
+x_f3 = l150*(q_f3 - x_common - m_f3a*x_a - m_f3s*x_s)
+l154 = constants[427]
+l155 = constants[428]
+l156 = constants[429]
+x_gen = l155*(l154*torque_shaft - torque_commanded) + l156*x_p
+add = x_a
+sdd = x_s
+f1dd = x_f1
+f2dd = x_f2
+f3dd = x_f3
+edd = x_e
+phidd = x_p
+gendd = x_gen
 hub_full_x = acc_f_s_x + add*tha_s_x + sdd*ths_s_x
 hub_full_y = acc_f_y + add*tha_y + sdd*ths_y
 hub_full_z = acc_f_z + add*tha_z + sdd*ths_z
-phidd = derivative[14]
 hub_fullspin_x = phidd + spin_f_s_x + add*wha_s_x + sdd*whs_s_x
 hub_fullspin_y = spin_h_y + add*wha_y + sdd*whs_y
 hub_fullspin_z = spin_h_z + add*wha_z + sdd*whs_z
 cos_cone = constants[39]
-u41 = cos_cone*wf_x
-sin_cone = constants[40]
-lw_c1_x = u41 - sin_cone*won_z
-u42 = sin_cone*wf_x
-lw_c1_z = u42 + cos_cone*won_z
-u43 = cos_cone*hub_full_x
-lg_c1_x = u43 - hub_full_z*sin_cone
-u44 = hub_full_x*sin_cone
-lg_c1_z = u44 + cos_cone*hub_full_z
-u45 = cos_cone*hub_fullspin_x
-lsp_c1_x = u45 - hub_fullspin_z*sin_cone
-u46 = hub_fullspin_x*sin_cone
-lsp_c1_z = u46 + cos_cone*hub_fullspin_z
-e = x[5]
-u47 = b_ex_turned*e
-f1 = x[2]
-bs1_x = u47 + b_fx_turned*f1
-u48 = b_ey_turned*e
-bs1_y = u48 + b_fy_turned*f1
-u49 = (f1*f1)
+u94 = cos_cone*wf_x
+lw_c1_x = u94 - sin_cone*won_z
+u95 = sin_cone*wf_x
+lw_c1_z = u95 + cos_cone*won_z
+u96 = cos_cone*hub_full_x
+lg_c1_x = u96 - hub_full_z*sin_cone
+u97 = hub_full_x*sin_cone
+lg_c1_z = u97 + cos_cone*hub_full_z
+u98 = cos_cone*hub_fullspin_x
+lsp_c1_x = u98 - hub_fullspin_z*sin_cone
+u99 = hub_fullspin_x*sin_cone
+lsp_c1_z = u99 + cos_cone*hub_fullspin_z
+u100 = b_ex_turned*e
+bs1_x = u100 + b_fx_turned*f1
+u101 = b_ey_turned*e
+bs1_y = u101 + b_fy_turned*f1
 b_sff = constants[21]
-u50 = (0.5)*b_sff
+u102 = (0.5)*b_sff
 b_sfe = constants[22]
-u51 = b_sfe*f1
-u52 = (e*e)
+u103 = b_sfe*f1
+u104 = (e*e)
 b_m1 = constants[1]
 b_see = constants[23]
-u53 = (0.5)*b_see*u52 - b_m1
-bs1_z = (-u53) - e*u51 - u49*u50
-u54 = 2.0*e
-u55 = b_fyey_turned*u54
-u56 = b_fyfy_turned*u49 + f1*u55
-u57 = b_eyey_turned*u52
+u105 = (0.5)*b_see*u104 - b_m1
+bs1_z = (-u105) - e*u103 - u102*u42
+u106 = b_fyey_turned*u45
+u107 = b_fyfy_turned*u42 + e*u106
+u108 = b_eyey_turned*u104
 b_m2 = constants[2]
 b_rsee = constants[26]
-u58 = b_m2 - b_rsee*u52
-u59 = u57 + u58
+u109 = b_m2 - b_rsee*u104
+u110 = u108 + u109
 b_rsfe = constants[25]
-u60 = b_rsfe*u54
+u111 = b_rsfe*u45
 b_rsff = constants[24]
-u61 = (-b_rsff*u49) - f1*u60
-bi1_xx = u56 + u59 + u61
-u62 = b_exey_turned*u52
-u63 = b_fxey_turned + b_fyex_turned
-u64 = f1*u63
-bi1_xy = (-u62) - b_fxfy_turned*u49 - e*u64
-u65 = b_rex_turned*e
-bi1_xz = (-u65) - b_rfx_turned*f1
-u66 = b_fxex_turned*u54
-u67 = b_fxfx_turned*u49 + f1*u66
-u68 = b_exex_turned*u52
-u69 = u58 + u68
-bi1_yy = u61 + u67 + u69
-u70 = b_rey_turned*e
-bi1_yz = (-u70) - b_rfy_turned*f1
-u71 = u57 + u68
-bi1_zz = u56 + u67 + u71
-u72 = -b_rsee*u54
-u73 = 2.0*f1
-u74 = u72 - b_rsfe*u73
-u75 = b_eyey_turned*u54
-u76 = u75 + b_fyey_turned*u73
-u77 = -u60
-u78 = u77 - b_rsff*u73
-u79 = u55 + b_fyfy_turned*u73
-ed = x[13]
-bid1_xx = ed*(u74 + u76) + f1d*(u78 + u79)
-u80 = b_exey_turned*u54
-u81 = e*u63
-bid1_xy = ed*((-u64) - u80) + f1d*((-u81) - b_fxfy_turned*u73)
-u82 = b_rex_turned*ed
-u83 = u82 + b_rfx_turned*f1d
-bid1_xz = -u83
-u84 = b_exex_turned*u54
-u85 = u84 + b_fxex_turned*u73
-u86 = u66 + b_fxfx_turned*u73
-bid1_yy = ed*(u74 + u85) + f1d*(u78 + u86)
-u87 = b_rey_turned*ed
-u88 = b_rfy_turned*f1d
-bid1_yz = (-u87) - u88
-bid1_zz = ed*(u76 + u85) + f1d*(u79 + u86)
-u89 = 2.0*ed
-u90 = b_ex_turned*u89
-u91 = 2.0*f1d
-blade1_whirl_x = u90 + b_fx_turned*u91 + bs1_z*won_y - bs1_y*lw_c1_z
-u92 = b_ey_turned*u89
-blade1_whirl_y = u92 + b_fy_turned*u91 + bs1_x*lw_c1_z - bs1_z*lw_c1_x
-u93 = b_see*e
-u94 = (-u51) - u93
-u95 = b_sfe*e
-u96 = (-u95) - b_sff*f1
-blade1_whirl_z = bs1_y*lw_c1_x + u89*u94 + u91*u96 - bs1_x*won_y
-u97 = -u87
-blade1_momentum_x = u97 + bi1_xx*lw_c1_x + bi1_xy*won_y + bi1_xz*lw_c1_z - u88
-blade1_momentum_y = u83 + bi1_xy*lw_c1_x + bi1_yy*won_y + bi1_yz*lw_c1_z
-u98 = b_fyex_turned - b_fxey_turned
-u99 = e*u98
-blade1_momentum_z = bi1_xz*lw_c1_x + bi1_yz*won_y + bi1_zz*lw_c1_z + f1d*u99 - ed*f1*u98
+u112 = (-b_rsff*u42) - e*u111
+bi1_xx = u107 + u110 + u112
+u113 = b_exey_turned*u104
+u114 = b_fxey_turned + b_fyex_turned
+u115 = f1*u114
+bi1_xy = (-u113) - b_fxfy_turned*u42 - e*u115
+u116 = b_rex_turned*e
+bi1_xz = (-u116) - b_rfx_turned*f1
+u117 = b_fxex_turned*u45
+u118 = b_fxfx_turned*u42 + e*u117
+u119 = b_exex_turned*u104
+u120 = u109 + u119
+bi1_yy = u112 + u118 + u120
+u121 = b_rey_turned*e
+bi1_yz = (-u121) - b_rfy_turned*f1
+u122 = u108 + u119
+bi1_zz = u107 + u118 + u122
+u123 = 2.0*e
+u124 = -b_rsee*u123
+u125 = u124 - u111
+u126 = b_eyey_turned*u123
+u127 = u106 + u126
+u128 = -b_rsfe*u123
+u129 = u128 - b_rsff*u45
+u130 = b_fyey_turned*u123
+u131 = u130 + b_fyfy_turned*u45
+bid1_xx = ed*(u125 + u127) + f1d*(u129 + u131)
+u132 = b_exey_turned*u123
+u133 = e*u114
+bid1_xy = ed*((-u115) - u132) + f1d*((-u133) - b_fxfy_turned*u45)
+u134 = b_rex_turned*ed
+u135 = u134 + b_rfx_turned*f1d
+bid1_xz = -u135
+u136 = b_exex_turned*u123
+u137 = u117 + u136
+u138 = b_fxex_turned*u123
+u139 = u138 + b_fxfx_turned*u45
+bid1_yy = ed*(u125 + u137) + f1d*(u129 + u139)
+u140 = b_rey_turned*ed
+u141 = b_rfy_turned*f1d
+bid1_yz = (-u140) - u141
+bid1_zz = ed*(u127 + u137) + f1d*(u131 + u139)
+u142 = 2.0*ed
+u143 = b_ex_turned*u142
+u144 = 2.0*f1d
+blade1_whirl_x = u143 + b_fx_turned*u144 + bs1_z*won_y - bs1_y*lw_c1_z
+u145 = b_ey_turned*u142
+blade1_whirl_y = u145 + b_fy_turned*u144 + bs1_x*lw_c1_z - bs1_z*lw_c1_x
+u146 = b_see*e
+u147 = (-u103) - u146
+u148 = b_sfe*e
+u149 = (-u148) - b_sff*f1
+blade1_whirl_z = bs1_y*lw_c1_x + u142*u147 + u144*u149 - bs1_x*won_y
+u150 = -u140
+blade1_momentum_x = u150 + bi1_xx*lw_c1_x + bi1_xy*won_y + bi1_xz*lw_c1_z - u141
+blade1_momentum_y = u135 + bi1_xy*lw_c1_x + bi1_yy*won_y + bi1_yz*lw_c1_z
+u151 = b_fyex_turned - b_fxey_turned
+u152 = e*u151
+blade1_momentum_z = bi1_xz*lw_c1_x + bi1_yz*won_y + bi1_zz*lw_c1_z + f1d*u152 - ed*f1*u151
 b_m = constants[0]
 blade1_force_x = b_m*lg_c1_x + blade1_whirl_z*won_y + bs1_z*hub_fullspin_y - blade1_whirl_y*lw_c1_z - bs1_y*lsp_c1_z
 blade1_force_y = b_m*hub_full_y + blade1_whirl_x*lw_c1_z + bs1_x*lsp_c1_z - blade1_whirl_z*lw_c1_x - bs1_z*lsp_c1_x
-u100 = b_see*(ed*ed)
-u101 = b_sfe*u89
-blade1_force_z = b_m*lg_c1_z + blade1_whirl_y*lw_c1_x + bs1_y*lsp_c1_x - u100 - b_sff*(f1d*f1d) - blade1_whirl_x*won_y - bs1_x*hub_fullspin_y - f1d*u101
+u153 = b_see*u54
+u154 = b_sfe*u142
+blade1_force_z = b_m*lg_c1_z + blade1_whirl_y*lw_c1_x + bs1_y*lsp_c1_x - u153 - b_sff*u48 - blade1_whirl_x*won_y - bs1_x*hub_fullspin_y - f1d*u154
 blade1_moment_x = bi1_xx*lsp_c1_x + bi1_xy*hub_fullspin_y + bi1_xz*lsp_c1_z + bid1_xx*lw_c1_x + bid1_xy*won_y + bid1_xz*lw_c1_z + blade1_momentum_z*won_y + bs1_y*lg_c1_z - blade1_momentum_y*lw_c1_z - bs1_z*hub_full_y
 blade1_moment_y = bi1_xy*lsp_c1_x + bi1_yy*hub_fullspin_y + bi1_yz*lsp_c1_z + bid1_xy*lw_c1_x + bid1_yy*won_y + bid1_yz*lw_c1_z + blade1_momentum_x*lw_c1_z + bs1_z*lg_c1_x - blade1_momentum_z*lw_c1_x - bs1_x*lg_c1_z
 blade1_moment_z = bi1_xz*lsp_c1_x + bi1_yz*hub_fullspin_y + bi1_zz*lsp_c1_z + bid1_xz*lw_c1_x + bid1_yz*won_y + bid1_zz*lw_c1_z + blade1_momentum_y*lw_c1_x + bs1_x*hub_full_y - blade1_momentum_x*won_y - bs1_y*lg_c1_x
-edd = derivative[13]
-u102 = b_ex_turned*edd
-u103 = uniform_cos + uniform_mean
-u104 = c_thrust*relative_x + c_thrust_edge*ed
-f1dd = derivative[10]
-blade1_net_x = pressure*(u104 + c_thrust_flap*f1d + c_thrust_kappa*kappa_cos + c_thrust_skew*skew_cos + c_thrust_w*u103 + c_thrust_y*relative_y) - blade1_force_x - u102 - b_fx_turned*f1dd
-u105 = b_ey_turned*edd
-u106 = c_tangential*relative_x + c_tangential_edge*ed
-blade1_net_y = pressure*((-u106) - c_tangential_flap*f1d - c_tangential_kappa*kappa_cos - c_tangential_skew*skew_cos - c_tangential_w*u103 - c_tangential_y*relative_y) - blade1_force_y - u105 - b_fy_turned*f1dd
-blade1_net_z = (-blade1_force_z) - edd*u94 - f1dd*u96
-u107 = b_rey_turned*edd
-u108 = c_torque*relative_x + c_torque_edge*ed
-u109 = pressure*radius
-blade1_netm_x = u107 + b_rfy_turned*f1dd + u109*(u108 + c_torque_flap*f1d + c_torque_kappa*kappa_cos + c_torque_skew*skew_cos + c_torque_w*u103 + c_torque_y*relative_y) - blade1_moment_x
-u110 = b_rex_turned*edd
-u111 = c_bending*relative_x + c_bending_edge*ed
-blade1_netm_y = pressure*radius*(u111 + c_bending_flap*f1d + c_bending_kappa*kappa_cos + c_bending_skew*skew_cos + c_bending_w*u103 + c_bending_y*relative_y) - blade1_moment_y - u110 - b_rfx_turned*f1dd
-blade1_netm_z = edd*f1*u98 - blade1_moment_z - f1dd*u99
-u112 = (0.5)*won_y
-half_sqrt3 = 0.8660254037844386
-u113 = half_sqrt3*won_z
-lw_2_y = u113 - u112
-u114 = (0.5)*won_z
-u115 = half_sqrt3*won_y
-lw_2_z = (-u114) - u115
-lw_c2_x = u41 - lw_2_z*sin_cone
-lw_c2_z = u42 + cos_cone*lw_2_z
-u116 = (0.5)*hub_full_y
-u117 = half_sqrt3*hub_full_z
-lg_2_y = u117 - u116
-u118 = (0.5)*hub_full_z
-u119 = half_sqrt3*hub_full_y
-lg_2_z = (-u118) - u119
-lg_c2_x = u43 - lg_2_z*sin_cone
-lg_c2_z = u44 + cos_cone*lg_2_z
-u120 = (0.5)*hub_fullspin_y
-u121 = half_sqrt3*hub_fullspin_z
-lsp_2_y = u121 - u120
-u122 = (0.5)*hub_fullspin_z
-u123 = half_sqrt3*hub_fullspin_y
-lsp_2_z = (-u122) - u123
-lsp_c2_x = u45 - lsp_2_z*sin_cone
-lsp_c2_z = u46 + cos_cone*lsp_2_z
-f2 = x[3]
-bs2_x = u47 + b_fx_turned*f2
-bs2_y = u48 + b_fy_turned*f2
-u124 = (f2*f2)
-bs2_z = (-u53) - f2*u95 - u124*u50
-u125 = b_fyfy_turned*u124 + f2*u55
-u126 = (-b_rsff*u124) - f2*u60
-bi2_xx = u125 + u126 + u59
-bi2_xy = (-u62) - b_fxfy_turned*u124 - f2*u81
-bi2_xz = (-u65) - b_rfx_turned*f2
-u127 = b_fxfx_turned*u124 + f2*u66
-bi2_yy = u126 + u127 + u69
-bi2_yz = (-u70) - b_rfy_turned*f2
-bi2_zz = u125 + u127 + u71
-u128 = 2.0*f2
-u129 = u72 - b_rsfe*u128
-u130 = u75 + b_fyey_turned*u128
-u131 = u77 - b_rsff*u128
-u132 = u55 + b_fyfy_turned*u128
-bid2_xx = ed*(u129 + u130) + f2d*(u131 + u132)
-bid2_xy = ed*((-u80) - f2*u63) + f2d*((-u81) - b_fxfy_turned*u128)
-u133 = u82 + b_rfx_turned*f2d
-bid2_xz = -u133
-u134 = u84 + b_fxex_turned*u128
-u135 = u66 + b_fxfx_turned*u128
-bid2_yy = ed*(u129 + u134) + f2d*(u131 + u135)
-u136 = b_rfy_turned*f2d
-bid2_yz = (-u136) - u87
-bid2_zz = ed*(u130 + u134) + f2d*(u132 + u135)
-u137 = 2.0*f2d
-blade2_whirl_x = u90 + b_fx_turned*u137 + bs2_z*lw_2_y - bs2_y*lw_c2_z
-blade2_whirl_y = u92 + b_fy_turned*u137 + bs2_x*lw_c2_z - bs2_z*lw_c2_x
-u138 = (-u93) - b_sfe*f2
-u139 = (-u95) - b_sff*f2
-blade2_whirl_z = bs2_y*lw_c2_x + u137*u139 + u138*u89 - bs2_x*lw_2_y
-blade2_momentum_x = u97 + bi2_xx*lw_c2_x + bi2_xy*lw_2_y + bi2_xz*lw_c2_z - u136
-blade2_momentum_y = u133 + bi2_xy*lw_c2_x + bi2_yy*lw_2_y + bi2_yz*lw_c2_z
-blade2_momentum_z = bi2_xz*lw_c2_x + bi2_yz*lw_2_y + bi2_zz*lw_c2_z + f2d*u99 - ed*f2*u98
+u155 = b_ex_turned*edd
+u156 = uniform_cos + uniform_mean
+blade1_net_x = pressure*(u81 + u83 + c_thrust_flap*f1d + c_thrust_w*u156) - blade1_force_x - u155 - b_fx_turned*f1dd
+u157 = b_ey_turned*edd
+u158 = c_tangential*relative_x + c_tangential_edge*ed
+blade1_net_y = pressure*((-u158) - u82 - c_tangential_flap*f1d - c_tangential_w*u156) - blade1_force_y - u157 - b_fy_turned*f1dd
+blade1_net_z = (-blade1_force_z) - edd*u147 - f1dd*u149
+u159 = b_rey_turned*edd
+u160 = pressure*radius
+blade1_netm_x = u159 + b_rfy_turned*f1dd + u160*(u84 + u86 + c_torque_flap*f1d + c_torque_w*u156) - blade1_moment_x
+u161 = b_rex_turned*edd
+u162 = c_bending*relative_x + c_bending_edge*ed
+blade1_netm_y = pressure*radius*(u162 + u85 + c_bending_flap*f1d + c_bending_w*u156) - blade1_moment_y - u161 - b_rfx_turned*f1dd
+blade1_netm_z = edd*f1*u151 - blade1_moment_z - f1dd*u152
+u163 = (0.5)*won_y
+u164 = half_sqrt3*won_z
+lw_2_y = u164 - u163
+u165 = (0.5)*won_z
+u166 = half_sqrt3*won_y
+lw_2_z = (-u165) - u166
+lw_c2_x = u94 - lw_2_z*sin_cone
+lw_c2_z = u95 + cos_cone*lw_2_z
+u167 = (0.5)*hub_full_y
+u168 = half_sqrt3*hub_full_z
+lg_2_y = u168 - u167
+u169 = (0.5)*hub_full_z
+u170 = half_sqrt3*hub_full_y
+lg_2_z = (-u169) - u170
+lg_c2_x = u96 - lg_2_z*sin_cone
+lg_c2_z = u97 + cos_cone*lg_2_z
+u171 = (0.5)*hub_fullspin_y
+u172 = half_sqrt3*hub_fullspin_z
+lsp_2_y = u172 - u171
+u173 = (0.5)*hub_fullspin_z
+u174 = half_sqrt3*hub_fullspin_y
+lsp_2_z = (-u173) - u174
+lsp_c2_x = u98 - lsp_2_z*sin_cone
+lsp_c2_z = u99 + cos_cone*lsp_2_z
+bs2_x = u100 + b_fx_turned*f2
+bs2_y = u101 + b_fy_turned*f2
+bs2_z = (-u105) - f2*u148 - u102*u43
+u175 = b_fyey_turned*u46
+u176 = b_fyfy_turned*u43 + e*u175
+u177 = b_rsfe*u46
+u178 = (-b_rsff*u43) - e*u177
+bi2_xx = u110 + u176 + u178
+bi2_xy = (-u113) - b_fxfy_turned*u43 - f2*u133
+bi2_xz = (-u116) - b_rfx_turned*f2
+u179 = b_fxex_turned*u46
+u180 = b_fxfx_turned*u43 + e*u179
+bi2_yy = u120 + u178 + u180
+bi2_yz = (-u121) - b_rfy_turned*f2
+bi2_zz = u122 + u176 + u180
+u181 = u124 - u177
+u182 = u126 + u175
+u183 = u128 - b_rsff*u46
+u184 = u130 + b_fyfy_turned*u46
+bid2_xx = ed*(u181 + u182) + f2d*(u183 + u184)
+bid2_xy = ed*((-u132) - f2*u114) + f2d*((-u133) - b_fxfy_turned*u46)
+u185 = u134 + b_rfx_turned*f2d
+bid2_xz = -u185
+u186 = u136 + u179
+u187 = u138 + b_fxfx_turned*u46
+bid2_yy = ed*(u181 + u186) + f2d*(u183 + u187)
+u188 = b_rfy_turned*f2d
+bid2_yz = (-u140) - u188
+bid2_zz = ed*(u182 + u186) + f2d*(u184 + u187)
+u189 = 2.0*f2d
+blade2_whirl_x = u143 + b_fx_turned*u189 + bs2_z*lw_2_y - bs2_y*lw_c2_z
+blade2_whirl_y = u145 + b_fy_turned*u189 + bs2_x*lw_c2_z - bs2_z*lw_c2_x
+u190 = (-u146) - b_sfe*f2
+u191 = (-u148) - b_sff*f2
+blade2_whirl_z = bs2_y*lw_c2_x + u142*u190 + u189*u191 - bs2_x*lw_2_y
+blade2_momentum_x = u150 + bi2_xx*lw_c2_x + bi2_xy*lw_2_y + bi2_xz*lw_c2_z - u188
+blade2_momentum_y = u185 + bi2_xy*lw_c2_x + bi2_yy*lw_2_y + bi2_yz*lw_c2_z
+blade2_momentum_z = bi2_xz*lw_c2_x + bi2_yz*lw_2_y + bi2_zz*lw_c2_z + f2d*u152 - ed*f2*u151
 blade2_force_x = b_m*lg_c2_x + blade2_whirl_z*lw_2_y + bs2_z*lsp_2_y - blade2_whirl_y*lw_c2_z - bs2_y*lsp_c2_z
 blade2_force_y = b_m*lg_2_y + blade2_whirl_x*lw_c2_z + bs2_x*lsp_c2_z - blade2_whirl_z*lw_c2_x - bs2_z*lsp_c2_x
-blade2_force_z = b_m*lg_c2_z + blade2_whirl_y*lw_c2_x + bs2_y*lsp_c2_x - u100 - b_sff*(f2d*f2d) - blade2_whirl_x*lw_2_y - bs2_x*lsp_2_y - f2d*u101
+blade2_force_z = b_m*lg_c2_z + blade2_whirl_y*lw_c2_x + bs2_y*lsp_c2_x - u153 - b_sff*u49 - blade2_whirl_x*lw_2_y - bs2_x*lsp_2_y - f2d*u154
 blade2_moment_x = bi2_xx*lsp_c2_x + bi2_xy*lsp_2_y + bi2_xz*lsp_c2_z + bid2_xx*lw_c2_x + bid2_xy*lw_2_y + bid2_xz*lw_c2_z + blade2_momentum_z*lw_2_y + bs2_y*lg_c2_z - blade2_momentum_y*lw_c2_z - bs2_z*lg_2_y
 blade2_moment_y = bi2_xy*lsp_c2_x + bi2_yy*lsp_2_y + bi2_yz*lsp_c2_z + bid2_xy*lw_c2_x + bid2_yy*lw_2_y + bid2_yz*lw_c2_z + blade2_momentum_x*lw_c2_z + bs2_z*lg_c2_x - blade2_momentum_z*lw_c2_x - bs2_x*lg_c2_z
 blade2_moment_z = bi2_xz*lsp_c2_x + bi2_yz*lsp_2_y + bi2_zz*lsp_c2_z + bid2_xz*lw_c2_x + bid2_yz*lw_2_y + bid2_zz*lw_c2_z + blade2_momentum_y*lw_c2_x + bs2_x*lg_2_y - blade2_momentum_x*lw_2_y - bs2_y*lg_c2_x
-u140 = (0.5)*kappa_cos
-u141 = half_sqrt3*kappa_sin
-u142 = u141 - u140
-u143 = (0.5)*skew_cos
-u144 = half_sqrt3*skew_sin
-u145 = u144 - u143
-u146 = (0.5)*uniform_cos
-u147 = half_sqrt3*uniform_sin
-u148 = u147 + uniform_mean - u146
-u149 = (0.5)*relative_y
-u150 = half_sqrt3*relative_z
-u151 = u150 - u149
-f2dd = derivative[11]
-blade2_net_x = pressure*(u104 + c_thrust_flap*f2d + c_thrust_kappa*u142 + c_thrust_skew*u145 + c_thrust_w*u148 + c_thrust_y*u151) - blade2_force_x - u102 - b_fx_turned*f2dd
-blade2_net_y = pressure*((-u106) - c_tangential_flap*f2d - c_tangential_kappa*u142 - c_tangential_skew*u145 - c_tangential_w*u148 - c_tangential_y*u151) - blade2_force_y - u105 - b_fy_turned*f2dd
-blade2_net_z = (-blade2_force_z) - edd*u138 - f2dd*u139
-blade2_netm_x = u107 + b_rfy_turned*f2dd + u109*(u108 + c_torque_flap*f2d + c_torque_kappa*u142 + c_torque_skew*u145 + c_torque_w*u148 + c_torque_y*u151) - blade2_moment_x
-blade2_netm_y = pressure*radius*(u111 + c_bending_flap*f2d + c_bending_kappa*u142 + c_bending_skew*u145 + c_bending_w*u148 + c_bending_y*u151) - blade2_moment_y - u110 - b_rfx_turned*f2dd
-blade2_netm_z = edd*f2*u98 - blade2_moment_z - f2dd*u99
-lw_3_y = (-u112) - u113
-lw_3_z = u115 - u114
-lw_c3_x = u41 - lw_3_z*sin_cone
-lw_c3_z = u42 + cos_cone*lw_3_z
-lg_3_y = (-u116) - u117
-lg_3_z = u119 - u118
-lg_c3_x = u43 - lg_3_z*sin_cone
-lg_c3_z = u44 + cos_cone*lg_3_z
-lsp_3_y = (-u120) - u121
-lsp_3_z = u123 - u122
-lsp_c3_x = u45 - lsp_3_z*sin_cone
-lsp_c3_z = u46 + cos_cone*lsp_3_z
-f3 = x[4]
-bs3_x = u47 + b_fx_turned*f3
-bs3_y = u48 + b_fy_turned*f3
-u152 = (f3*f3)
-bs3_z = (-u53) - f3*u95 - u152*u50
-u153 = b_fyfy_turned*u152 + f3*u55
-u154 = (-b_rsff*u152) - f3*u60
-bi3_xx = u153 + u154 + u59
-bi3_xy = (-u62) - b_fxfy_turned*u152 - f3*u81
-bi3_xz = (-u65) - b_rfx_turned*f3
-u155 = b_fxfx_turned*u152 + f3*u66
-bi3_yy = u154 + u155 + u69
-bi3_yz = (-u70) - b_rfy_turned*f3
-bi3_zz = u153 + u155 + u71
-u156 = 2.0*f3
-u157 = u72 - b_rsfe*u156
-u158 = u75 + b_fyey_turned*u156
-u159 = u77 - b_rsff*u156
-u160 = u55 + b_fyfy_turned*u156
-bid3_xx = ed*(u157 + u158) + f3d*(u159 + u160)
-bid3_xy = ed*((-u80) - f3*u63) + f3d*((-u81) - b_fxfy_turned*u156)
-u161 = u82 + b_rfx_turned*f3d
-bid3_xz = -u161
-u162 = u84 + b_fxex_turned*u156
-u163 = u66 + b_fxfx_turned*u156
-bid3_yy = ed*(u157 + u162) + f3d*(u159 + u163)
-u164 = b_rfy_turned*f3d
-bid3_yz = (-u164) - u87
-bid3_zz = ed*(u158 + u162) + f3d*(u160 + u163)
-u165 = 2.0*f3d
-blade3_whirl_x = u90 + b_fx_turned*u165 + bs3_z*lw_3_y - bs3_y*lw_c3_z
-blade3_whirl_y = u92 + b_fy_turned*u165 + bs3_x*lw_c3_z - bs3_z*lw_c3_x
-u166 = (-u93) - b_sfe*f3
-u167 = (-u95) - b_sff*f3
-blade3_whirl_z = bs3_y*lw_c3_x + u165*u167 + u166*u89 - bs3_x*lw_3_y
-blade3_momentum_x = u97 + bi3_xx*lw_c3_x + bi3_xy*lw_3_y + bi3_xz*lw_c3_z - u164
-blade3_momentum_y = u161 + bi3_xy*lw_c3_x + bi3_yy*lw_3_y + bi3_yz*lw_c3_z
-blade3_momentum_z = bi3_xz*lw_c3_x + bi3_yz*lw_3_y + bi3_zz*lw_c3_z + f3d*u99 - ed*f3*u98
+u192 = (0.5)*kappa_cos
+u193 = half_sqrt3*kappa_sin
+u194 = u193 - u192
+u195 = (0.5)*skew_cos
+u196 = half_sqrt3*skew_sin
+u197 = u196 - u195
+u198 = (0.5)*uniform_cos
+u199 = half_sqrt3*uniform_sin
+u200 = u199 + uniform_mean - u198
+u201 = (0.5)*relative_y
+u202 = half_sqrt3*relative_z
+u203 = u202 - u201
+blade2_net_x = pressure*(u81 + c_thrust_flap*f2d + c_thrust_kappa*u194 + c_thrust_skew*u197 + c_thrust_w*u200 + c_thrust_y*u203) - blade2_force_x - u155 - b_fx_turned*f2dd
+blade2_net_y = pressure*((-u158) - c_tangential_flap*f2d - c_tangential_kappa*u194 - c_tangential_skew*u197 - c_tangential_w*u200 - c_tangential_y*u203) - blade2_force_y - u157 - b_fy_turned*f2dd
+blade2_net_z = (-blade2_force_z) - edd*u190 - f2dd*u191
+blade2_netm_x = u159 + b_rfy_turned*f2dd + u160*(u84 + c_torque_flap*f2d + c_torque_kappa*u194 + c_torque_skew*u197 + c_torque_w*u200 + c_torque_y*u203) - blade2_moment_x
+blade2_netm_y = pressure*radius*(u162 + c_bending_flap*f2d + c_bending_kappa*u194 + c_bending_skew*u197 + c_bending_w*u200 + c_bending_y*u203) - blade2_moment_y - u161 - b_rfx_turned*f2dd
+blade2_netm_z = edd*f2*u151 - blade2_moment_z - f2dd*u152
+lw_3_y = (-u163) - u164
+lw_3_z = u166 - u165
+lw_c3_x = u94 - lw_3_z*sin_cone
+lw_c3_z = u95 + cos_cone*lw_3_z
+lg_3_y = (-u167) - u168
+lg_3_z = u170 - u169
+lg_c3_x = u96 - lg_3_z*sin_cone
+lg_c3_z = u97 + cos_cone*lg_3_z
+lsp_3_y = (-u171) - u172
+lsp_3_z = u174 - u173
+lsp_c3_x = u98 - lsp_3_z*sin_cone
+lsp_c3_z = u99 + cos_cone*lsp_3_z
+bs3_x = u100 + b_fx_turned*f3
+bs3_y = u101 + b_fy_turned*f3
+bs3_z = (-u105) - f3*u148 - u102*u44
+u204 = b_fyey_turned*u47
+u205 = b_fyfy_turned*u44 + e*u204
+u206 = b_rsfe*u47
+u207 = (-b_rsff*u44) - e*u206
+bi3_xx = u110 + u205 + u207
+bi3_xy = (-u113) - b_fxfy_turned*u44 - f3*u133
+bi3_xz = (-u116) - b_rfx_turned*f3
+u208 = b_fxex_turned*u47
+u209 = b_fxfx_turned*u44 + e*u208
+bi3_yy = u120 + u207 + u209
+bi3_yz = (-u121) - b_rfy_turned*f3
+bi3_zz = u122 + u205 + u209
+u210 = u124 - u206
+u211 = u126 + u204
+u212 = u128 - b_rsff*u47
+u213 = u130 + b_fyfy_turned*u47
+bid3_xx = ed*(u210 + u211) + f3d*(u212 + u213)
+bid3_xy = ed*((-u132) - f3*u114) + f3d*((-u133) - b_fxfy_turned*u47)
+u214 = u134 + b_rfx_turned*f3d
+bid3_xz = -u214
+u215 = u136 + u208
+u216 = u138 + b_fxfx_turned*u47
+bid3_yy = ed*(u210 + u215) + f3d*(u212 + u216)
+u217 = b_rfy_turned*f3d
+bid3_yz = (-u140) - u217
+bid3_zz = ed*(u211 + u215) + f3d*(u213 + u216)
+u218 = 2.0*f3d
+blade3_whirl_x = u143 + b_fx_turned*u218 + bs3_z*lw_3_y - bs3_y*lw_c3_z
+blade3_whirl_y = u145 + b_fy_turned*u218 + bs3_x*lw_c3_z - bs3_z*lw_c3_x
+u219 = (-u146) - b_sfe*f3
+u220 = (-u148) - b_sff*f3
+blade3_whirl_z = bs3_y*lw_c3_x + u142*u219 + u218*u220 - bs3_x*lw_3_y
+blade3_momentum_x = u150 + bi3_xx*lw_c3_x + bi3_xy*lw_3_y + bi3_xz*lw_c3_z - u217
+blade3_momentum_y = u214 + bi3_xy*lw_c3_x + bi3_yy*lw_3_y + bi3_yz*lw_c3_z
+blade3_momentum_z = bi3_xz*lw_c3_x + bi3_yz*lw_3_y + bi3_zz*lw_c3_z + f3d*u152 - ed*f3*u151
 blade3_force_x = b_m*lg_c3_x + blade3_whirl_z*lw_3_y + bs3_z*lsp_3_y - blade3_whirl_y*lw_c3_z - bs3_y*lsp_c3_z
 blade3_force_y = b_m*lg_3_y + blade3_whirl_x*lw_c3_z + bs3_x*lsp_c3_z - blade3_whirl_z*lw_c3_x - bs3_z*lsp_c3_x
-blade3_force_z = b_m*lg_c3_z + blade3_whirl_y*lw_c3_x + bs3_y*lsp_c3_x - u100 - b_sff*(f3d*f3d) - blade3_whirl_x*lw_3_y - bs3_x*lsp_3_y - f3d*u101
+blade3_force_z = b_m*lg_c3_z + blade3_whirl_y*lw_c3_x + bs3_y*lsp_c3_x - u153 - b_sff*u50 - blade3_whirl_x*lw_3_y - bs3_x*lsp_3_y - f3d*u154
 blade3_moment_x = bi3_xx*lsp_c3_x + bi3_xy*lsp_3_y + bi3_xz*lsp_c3_z + bid3_xx*lw_c3_x + bid3_xy*lw_3_y + bid3_xz*lw_c3_z + blade3_momentum_z*lw_3_y + bs3_y*lg_c3_z - blade3_momentum_y*lw_c3_z - bs3_z*lg_3_y
 blade3_moment_y = bi3_xy*lsp_c3_x + bi3_yy*lsp_3_y + bi3_yz*lsp_c3_z + bid3_xy*lw_c3_x + bid3_yy*lw_3_y + bid3_yz*lw_c3_z + blade3_momentum_x*lw_c3_z + bs3_z*lg_c3_x - blade3_momentum_z*lw_c3_x - bs3_x*lg_c3_z
 blade3_moment_z = bi3_xz*lsp_c3_x + bi3_yz*lsp_3_y + bi3_zz*lsp_c3_z + bid3_xz*lw_c3_x + bid3_yz*lw_3_y + bid3_zz*lw_c3_z + blade3_momentum_y*lw_c3_x + bs3_x*lg_3_y - blade3_momentum_x*lw_3_y - bs3_y*lg_c3_x
-u168 = (-u140) - u141
-u169 = (-u143) - u144
-u170 = uniform_mean - u146 - u147
-u171 = (-u149) - u150
-f3dd = derivative[12]
-blade3_net_x = pressure*(u104 + c_thrust_flap*f3d + c_thrust_kappa*u168 + c_thrust_skew*u169 + c_thrust_w*u170 + c_thrust_y*u171) - blade3_force_x - u102 - b_fx_turned*f3dd
-blade3_net_y = pressure*((-u106) - c_tangential_flap*f3d - c_tangential_kappa*u168 - c_tangential_skew*u169 - c_tangential_w*u170 - c_tangential_y*u171) - blade3_force_y - u105 - b_fy_turned*f3dd
-blade3_net_z = (-blade3_force_z) - edd*u166 - f3dd*u167
-blade3_netm_x = u107 + b_rfy_turned*f3dd + u109*(u108 + c_torque_flap*f3d + c_torque_kappa*u168 + c_torque_skew*u169 + c_torque_w*u170 + c_torque_y*u171) - blade3_moment_x
-blade3_netm_y = pressure*radius*(u111 + c_bending_flap*f3d + c_bending_kappa*u168 + c_bending_skew*u169 + c_bending_w*u170 + c_bending_y*u171) - blade3_moment_y - u110 - b_rfx_turned*f3dd
-blade3_netm_z = edd*f3*u98 - blade3_moment_z - f3dd*u99
+u221 = (-u192) - u193
+u222 = (-u195) - u196
+u223 = uniform_mean - u198 - u199
+u224 = (-u201) - u202
+blade3_net_x = pressure*(u81 + c_thrust_flap*f3d + c_thrust_kappa*u221 + c_thrust_skew*u222 + c_thrust_w*u223 + c_thrust_y*u224) - blade3_force_x - u155 - b_fx_turned*f3dd
+blade3_net_y = pressure*((-u158) - c_tangential_flap*f3d - c_tangential_kappa*u221 - c_tangential_skew*u222 - c_tangential_w*u223 - c_tangential_y*u224) - blade3_force_y - u157 - b_fy_turned*f3dd
+blade3_net_z = (-blade3_force_z) - edd*u219 - f3dd*u220
+blade3_netm_x = u159 + b_rfy_turned*f3dd + u160*(u84 + c_torque_flap*f3d + c_torque_kappa*u221 + c_torque_skew*u222 + c_torque_w*u223 + c_torque_y*u224) - blade3_moment_x
+blade3_netm_y = pressure*radius*(u162 + c_bending_flap*f3d + c_bending_kappa*u221 + c_bending_skew*u222 + c_bending_w*u223 + c_bending_y*u224) - blade3_moment_y - u161 - b_rfx_turned*f3dd
+blade3_netm_z = edd*f3*u151 - blade3_moment_z - f3dd*u152
 h_m = constants[43]
 rotor_force_x = blade1_net_x*cos_cone + blade1_net_z*sin_cone + blade2_net_x*cos_cone + blade2_net_z*sin_cone + blade3_net_x*cos_cone + blade3_net_z*sin_cone - h_m*hub_full_x
 rotor_force_y = blade1_net_y + half_sqrt3*(blade3_net_z*cos_cone - blade3_net_x*sin_cone) - (0.5)*blade2_net_y - (0.5)*blade3_net_y - h_m*hub_full_y - half_sqrt3*(blade2_net_z*cos_cone - blade2_net_x*sin_cone)
 rotor_force_z = blade1_net_z*cos_cone + (0.5)*blade2_net_x*sin_cone + blade2_net_y*half_sqrt3 + (0.5)*blade3_net_x*sin_cone - blade1_net_x*sin_cone - (0.5)*blade2_net_z*cos_cone - blade3_net_y*half_sqrt3 - (0.5)*blade3_net_z*cos_cone - h_m*hub_full_z
-h_ixx = constants[44]
 rotor_moment_x = blade1_netm_x*cos_cone + blade1_netm_z*sin_cone + blade2_netm_x*cos_cone + blade2_netm_z*sin_cone + blade3_netm_x*cos_cone + blade3_netm_z*sin_cone - h_ixx*hub_fullspin_x
-h_itt = constants[45]
-rotor_moment_y = blade1_netm_y + h_itt*wf_x*won_z + half_sqrt3*(blade3_netm_z*cos_cone - blade3_netm_x*sin_cone) - (0.5)*blade2_netm_y - (0.5)*blade3_netm_y - h_itt*hub_fullspin_y - h_ixx*wf_x*won_z - half_sqrt3*(blade2_netm_z*cos_cone - blade2_netm_x*sin_cone)
-rotor_moment_z = blade1_netm_z*cos_cone + (0.5)*blade2_netm_x*sin_cone + blade2_netm_y*half_sqrt3 + (0.5)*blade3_netm_x*sin_cone + h_ixx*wf_x*won_y - blade1_netm_x*sin_cone - (0.5)*blade2_netm_z*cos_cone - blade3_netm_y*half_sqrt3 - (0.5)*blade3_netm_z*cos_cone - h_itt*hub_fullspin_z - h_itt*wf_x*won_y
-u172 = cos_phi*rotor_force_z + rotor_force_y*sin_phi
-rf_n_x = cos_tilt*rotor_force_x - sin_tilt*u172
+rotor_moment_y = blade1_netm_y + h_itt*wf_x*won_z + half_sqrt3*(blade3_netm_z*cos_cone - blade3_netm_x*sin_cone) - (0.5)*blade2_netm_y - (0.5)*blade3_netm_y - h_itt*hub_fullspin_y - h_ixx*u62 - half_sqrt3*(blade2_netm_z*cos_cone - blade2_netm_x*sin_cone)
+rotor_moment_z = blade1_netm_z*cos_cone + (0.5)*blade2_netm_x*sin_cone + blade2_netm_y*half_sqrt3 + (0.5)*blade3_netm_x*sin_cone + h_ixx*wf_x*won_y - blade1_netm_x*sin_cone - (0.5)*blade2_netm_z*cos_cone - blade3_netm_y*half_sqrt3 - (0.5)*blade3_netm_z*cos_cone - h_itt*hub_fullspin_z - h_itt*u61
+u225 = cos_phi*rotor_force_z + rotor_force_y*sin_phi
+rf_n_x = cos_tilt*rotor_force_x - sin_tilt*u225
 rf_n_y = cos_phi*rotor_force_y - rotor_force_z*sin_phi
-rf_n_z = cos_tilt*u172 + rotor_force_x*sin_tilt
-u173 = cos_phi*rotor_moment_z + rotor_moment_y*sin_phi
-rm_n_x = cos_tilt*rotor_moment_x - sin_tilt*u173
+rf_n_z = cos_tilt*u225 + rotor_force_x*sin_tilt
+u226 = cos_phi*rotor_moment_z + rotor_moment_y*sin_phi
+rm_n_x = cos_tilt*rotor_moment_x - sin_tilt*u226
 rm_n_y = cos_phi*rotor_moment_y - rotor_moment_z*sin_phi
-rm_n_z = cos_tilt*u173 + rotor_moment_x*sin_tilt
-n_y = constants[50]
-n_z = constants[51]
-nacl_ta_x = ta_x + n_z*wa_y - n_y*wa_z
-n_x = constants[49]
-nacl_ta_y = ta_y + n_x*wa_z
-nacl_ta_z = (-u31) - n_x*wa_y
-nacl_ts_y = ts_y + n_z*t_slope_ss
-nacl_ts_z = ts_z - n_y*t_slope_ss
-u174 = n_y*wn_x - n_x*wn_y
-u175 = n_x*wn_z - n_z*wn_x
-nacl_acc_x = top_x + n_z*spin_n_y + u174*wn_y - n_y*spin_n_z - u175*wn_z
-u176 = n_z*wn_y - n_y*wn_z
-nacl_acc_y = top_y + n_x*spin_n_z + u176*wn_z - u174*wn_x
-nacl_acc_z = u175*wn_x - u36 - n_x*spin_n_y - u176*wn_y
+rm_n_z = cos_tilt*u226 + rotor_moment_x*sin_tilt
+nacl_ta_x = u65
+nacl_ta_y = u66
+nacl_ta_z = u67
+nacl_ts_y = u68
+nacl_ts_z = u69
+nacl_acc_x = u72
+nacl_acc_y = u74
+nacl_acc_z = u75
 nacl_full_x = nacl_acc_x + add*nacl_ta_x + sdd*ts_x
 nacl_full_y = nacl_acc_y + add*nacl_ta_y + nacl_ts_y*sdd
 nacl_full_z = nacl_acc_z + add*nacl_ta_z + nacl_ts_z*sdd
 nacl_fullspin_x = -sdd*t_slope_ss
 nacl_fullspin_y = spin_n_y + add*wa_y
 nacl_fullspin_z = spin_n_z + add*wa_z
-n_m = constants[48]
 nac_force_x = -n_m*nacl_full_x
 nac_force_y = -n_m*nacl_full_y
 nac_force_z = -n_m*nacl_full_z
@@ -1874,25 +2679,14 @@ top_force_x = nac_force_x + rf_n_x
 top_force_y = nac_force_y + rf_n_y
 top_force_z = nac_force_z + rf_n_z
 g_i = constants[55]
-gendd = derivative[15]
-u177 = g_i*gendd
-n_ixx = constants[52]
-n_iyy = constants[53]
-n_izz = constants[54]
-top_moment_x = rm_n_x + n_iyy*wn_y*wn_z + n_y*nac_force_z - cos_tilt*u177 - l1*rf_n_y - n_ixx*nacl_fullspin_x - n_izz*u35 - n_z*nac_force_y
-top_moment_y = rm_n_y + l1*rf_n_x + n_izz*wn_x*wn_z + n_z*nac_force_x - l0*rf_n_z - n_ixx*wn_x*wn_z - n_iyy*nacl_fullspin_y - n_x*nac_force_z
-top_moment_z = rm_n_z + l0*rf_n_y + n_ixx*wn_x*wn_y + n_x*nac_force_y - n_iyy*u34 - n_izz*nacl_fullspin_z - n_y*nac_force_x - sin_tilt*u177
-u178 = roll_cos*top_force_z + roll_sin*top_force_y
-base_force_x = pitch_cos*top_force_x + pitch_sin*u178
+u227 = g_i*gendd
+top_moment_x = rm_n_x + u76 + n_y*nac_force_z - u77 - cos_tilt*u227 - l1*rf_n_y - n_ixx*nacl_fullspin_x - n_z*nac_force_y
+top_moment_y = rm_n_y + l1*rf_n_x + n_z*nac_force_x - u79 - l0*rf_n_z - n_iyy*nacl_fullspin_y - n_x*nac_force_z
+top_moment_z = rm_n_z + l0*rf_n_y + n_x*nac_force_y - u80 - n_izz*nacl_fullspin_z - n_y*nac_force_x - sin_tilt*u227
+u228 = roll_cos*top_force_z + roll_sin*top_force_y
+base_force_x = pitch_cos*top_force_x + pitch_sin*u228
 base_force_y = roll_cos*top_force_y - roll_sin*top_force_z
-base_force_z = pitch_cos*u178 - pitch_sin*top_force_x
-d_d = constants[60]
-d_k = constants[59]
-gen = x[7]
-gend = x[15]
-l3 = constants[276]
-l4 = constants[277]
-torque_shaft = d_d*(phid - gend*l3) + d_k*(phi - gen*l3) + l4*torque_commanded
+base_force_z = pitch_cos*u228 - pitch_sin*top_force_x
 t_fa = constants[64]
 t_h = constants[61]
 t_zfa = constants[66]
@@ -1907,10 +2701,8 @@ out[4] = theta_c*(blade3_netm_y - b_root*blade3_net_x) + theta_s*(blade3_netm_x 
 out[5] = theta_c*(blade1_netm_x + b_root*blade1_net_y) - theta_s*(blade1_netm_y - b_root*blade1_net_x)
 out[6] = theta_c*(blade2_netm_x + b_root*blade2_net_y) - theta_s*(blade2_netm_y - b_root*blade2_net_x)
 out[7] = theta_c*(blade3_netm_x + b_root*blade3_net_y) - theta_s*(blade3_netm_y - b_root*blade3_net_x)
-l5 = constants[278]
-out[8] = torque_shaft + l5*phidd
-l6 = constants[279]
-out[9] = l6*pressure*(c_thrust*relative_x + c_thrust_edge*ed + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
+out[8] = torque_shaft + l94*phidd
+out[9] = l91*pressure*(c_thrust*relative_x + c_thrust_edge*ed + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
 out[10] = torque_commanded
 out[11] = b_tip_ex_turned*e + b_tip_fx_turned*f1
 out[12] = b_tip_ex_turned*e + b_tip_fx_turned*f2
@@ -1921,10 +2713,10 @@ out[16] = b_tip_ey_turned*e + b_tip_fy_turned*f3
 out[17] = add
 out[18] = sdd
 """)
-_loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'derivative', 'out'), LANES)
+_loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'out'), LANES)
 
 
 @njit(**INLINE)
-def loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped):
-    """Load channels of LANES states: x, derivative (18, LANES), wind (5, LANES), control (0, LANES), out (k, LANES)."""
-    _loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped)
+def loads(x, wind, control, out, start, tables, cells, constants, clamped):
+    """Load channels of LANES states: x (18, LANES), wind (5, LANES), control (0, LANES), out (k, LANES)."""
+    _loads(x, wind, control, out, start, tables, cells, constants, clamped)

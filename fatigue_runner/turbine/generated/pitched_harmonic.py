@@ -275,19 +275,169 @@ def constants(parameters):
     l0 = cos_tilt*overhang
     l1 = tower_to_shaft + overhang*sin_tilt
     l2 = (0.3333333333333333)*q_area
-    l3 = (tg_e*tg_e)
-    l4 = (1.0/g_ratio)
-    l5 = g_ratio*g_rigid/g_efficiency
-    l6 = g_i*(g_ratio*g_ratio)*g_rigid/g_efficiency
-    l7 = 3.0*cos_cone
-    l8 = (0.5)*b_fxfx - (0.5)*b_fyfy
-    l9 = (0.5)*b_fxfx + (0.5)*b_fyfy
-    l10 = (0.5)*b_exex - (0.5)*b_eyey
-    l11 = (0.5)*b_exex + (0.5)*b_eyey
-    l12 = (0.5)*b_fxex - (0.5)*b_fyey
-    l13 = (0.5)*b_fxey + (0.5)*b_fyex
-    l14 = (0.5)*b_fxex + (0.5)*b_fyey
-    l15 = (0.5)*b_fxey - (0.5)*b_fyex
+    l3 = (1.5)*b_see*sin_cone
+    l4 = 3.0*b_sfe*sin_cone
+    l5 = 3.0*b_ex*cos_cone
+    l6 = 3.0*b_ey*cos_cone
+    l7 = 3.0*b_fx*cos_cone
+    l8 = 3.0*b_fy*cos_cone
+    l9 = (1.5)*b_sff*sin_cone
+    l10 = 3.0*b_m1*sin_cone
+    l11 = (1.5)*b_sfe*cos_cone
+    l12 = (1.5)*b_fy
+    l13 = (1.5)*b_fx
+    l14 = (1.5)*b_fx*sin_cone
+    l15 = (1.5)*b_fy*sin_cone
+    l16 = (0.75)*b_sff*cos_cone
+    l17 = 6.0*b_sfe*sin_cone
+    l18 = 3.0*b_sff*sin_cone
+    l19 = 3.0*b_see*sin_cone
+    l20 = 3.0*b_sfe*cos_cone
+    l21 = (1.5)*b_sff*cos_cone
+    l22 = 3.0*b_fxey*sin_cone - 3.0*b_fyex*sin_cone
+    l23 = 3.0*b_rey*cos_cone
+    l24 = 3.0*b_rex*cos_cone
+    l25 = (1.5)*b_fxey*cos_cone - (1.5)*b_fyex*cos_cone
+    l26 = 3.0*b_rfy*cos_cone
+    l27 = 3.0*b_rfx*cos_cone
+    l28 = (1.5)*b_rfx
+    l29 = (1.5)*b_rfy
+    l30 = (1.5)*b_rfy*sin_cone
+    l31 = (1.5)*b_rfx*sin_cone
+    l32 = (1.5)*b_exex*(cos_cone*cos_cone) - (1.5)*b_eyey*(cos_cone*cos_cone)
+    l33 = 3.0*b_exey*(cos_cone*cos_cone)
+    l34 = (1.5)*b_exex*(cos_cone*cos_cone) + 3.0*b_exex*(sin_cone*sin_cone) + (1.5)*b_eyey*(cos_cone*cos_cone) + 3.0*b_eyey*(sin_cone*sin_cone) - 3.0*b_rsee*(cos_cone*cos_cone)
+    l35 = 3.0*b_fxex*(cos_cone*cos_cone) - 3.0*b_fyey*(cos_cone*cos_cone)
+    l36 = 3.0*b_fxey*(cos_cone*cos_cone) + 3.0*b_fyex*(cos_cone*cos_cone)
+    l37 = 3.0*b_fxex*(cos_cone*cos_cone) + 6.0*b_fxex*(sin_cone*sin_cone) + 3.0*b_fyey*(cos_cone*cos_cone) + 6.0*b_fyey*(sin_cone*sin_cone) - 6.0*b_rsfe*(cos_cone*cos_cone)
+    l38 = 6.0*b_rex*cos_cone*sin_cone
+    l39 = 6.0*b_rey*cos_cone*sin_cone
+    l40 = 6.0*b_rfx*cos_cone*sin_cone
+    l41 = 6.0*b_rfy*cos_cone*sin_cone
+    l42 = (1.5)*b_fxfx*(cos_cone*cos_cone) - (1.5)*b_fyfy*(cos_cone*cos_cone)
+    l43 = 3.0*b_fxfy*(cos_cone*cos_cone)
+    l44 = (1.5)*b_fxfx*(cos_cone*cos_cone) + 3.0*b_fxfx*(sin_cone*sin_cone) + (1.5)*b_fyfy*(cos_cone*cos_cone) + 3.0*b_fyfy*(sin_cone*sin_cone) - 3.0*b_rsff*(cos_cone*cos_cone)
+    l45 = 3.0*b_m2*(cos_cone*cos_cone)
+    l46 = (1.5)*b_fxey*cos_cone + (1.5)*b_fyex*cos_cone
+    l47 = (1.5)*b_fxex*cos_cone - (1.5)*b_fyey*cos_cone
+    l48 = (1.5)*b_fxex*cos_cone*sin_cone - (1.5)*b_fyey*cos_cone*sin_cone
+    l49 = (1.5)*b_fxey*cos_cone*sin_cone + (1.5)*b_fyex*cos_cone*sin_cone
+    l50 = (1.5)*b_fxex*cos_cone*sin_cone + (1.5)*b_fyey*cos_cone*sin_cone + 3.0*b_rsfe*cos_cone*sin_cone
+    l51 = (1.5)*b_rfx*(cos_cone*cos_cone) - (1.5)*b_rfx*(sin_cone*sin_cone)
+    l52 = (1.5)*b_rfy*(cos_cone*cos_cone) - (1.5)*b_rfy*(sin_cone*sin_cone)
+    l53 = (1.5)*b_fxfy*cos_cone
+    l54 = (0.75)*b_fxfx*cos_cone - (0.75)*b_fyfy*cos_cone
+    l55 = (0.75)*b_fxfx*cos_cone*sin_cone - (0.75)*b_fyfy*cos_cone*sin_cone
+    l56 = (1.5)*b_fxfy*cos_cone*sin_cone
+    l57 = (0.75)*b_fxfx*cos_cone*sin_cone + (0.75)*b_fyfy*cos_cone*sin_cone + (1.5)*b_rsff*cos_cone*sin_cone
+    l58 = (1.5)*b_fxey*sin_cone + (1.5)*b_fyex*sin_cone
+    l59 = (1.5)*b_fxex*sin_cone - (1.5)*b_fyey*sin_cone
+    l60 = (0.75)*b_fxex*(sin_cone*sin_cone) + (0.75)*b_fxex - (0.75)*b_fyey*(sin_cone*sin_cone) - (0.75)*b_fyey
+    l61 = (0.75)*b_fxey*(sin_cone*sin_cone) + (0.75)*b_fxey + (0.75)*b_fyex*(sin_cone*sin_cone) + (0.75)*b_fyex
+    l62 = (1.5)*b_fxex*(cos_cone*cos_cone) + (0.75)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fyey*(cos_cone*cos_cone) + (0.75)*b_fyey*(sin_cone*sin_cone) + (1.5)*b_rsfe - (0.75)*b_fxex - (0.75)*b_fyey - (1.5)*b_rsfe*(sin_cone*sin_cone)
+    l63 = (1.5)*b_rfy*cos_cone
+    l64 = (1.5)*b_rfx*cos_cone
+    l65 = (1.5)*b_rfx*cos_cone*sin_cone
+    l66 = (1.5)*b_rfy*cos_cone*sin_cone
+    l67 = (1.5)*b_fxfy*sin_cone
+    l68 = (0.75)*b_fxfx*sin_cone - (0.75)*b_fyfy*sin_cone
+    l69 = (0.375)*b_fxfx*(sin_cone*sin_cone) + (0.375)*b_fxfx - (0.375)*b_fyfy*(sin_cone*sin_cone) - (0.375)*b_fyfy
+    l70 = (0.75)*b_fxfy*(sin_cone*sin_cone) + (0.75)*b_fxfy
+    l71 = (0.75)*b_fxfx*(cos_cone*cos_cone) + (0.375)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fyfy*(cos_cone*cos_cone) + (0.375)*b_fyfy*(sin_cone*sin_cone) + (0.75)*b_rsff - (0.375)*b_fxfx - (0.375)*b_fyfy - (0.75)*b_rsff*(sin_cone*sin_cone)
+    l72 = (0.75)*b_exex*(sin_cone*sin_cone) + (0.75)*b_eyey - (0.75)*b_exex - (0.75)*b_eyey*(sin_cone*sin_cone)
+    l73 = (1.5)*b_exey*(sin_cone*sin_cone) - (1.5)*b_exey
+    l74 = (1.5)*b_exex*(cos_cone*cos_cone) + (0.75)*b_exex*(sin_cone*sin_cone) + (0.75)*b_exex + (1.5)*b_eyey*(cos_cone*cos_cone) + (0.75)*b_eyey*(sin_cone*sin_cone) + (0.75)*b_eyey - (1.5)*b_rsee*(sin_cone*sin_cone) - (1.5)*b_rsee
+    l75 = (1.5)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fyey - (1.5)*b_fxex - (1.5)*b_fyey*(sin_cone*sin_cone)
+    l76 = (1.5)*b_fxey*(sin_cone*sin_cone) + (1.5)*b_fyex*(sin_cone*sin_cone) - (1.5)*b_fxey - (1.5)*b_fyex
+    l77 = 3.0*b_fxex*(cos_cone*cos_cone) + (1.5)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fxex + 3.0*b_fyey*(cos_cone*cos_cone) + (1.5)*b_fyey*(sin_cone*sin_cone) + (1.5)*b_fyey - 3.0*b_rsfe*(sin_cone*sin_cone) - 3.0*b_rsfe
+    l78 = 3.0*b_rex*cos_cone*sin_cone
+    l79 = 3.0*b_rey*cos_cone*sin_cone
+    l80 = 3.0*b_rfx*cos_cone*sin_cone
+    l81 = 3.0*b_rfy*cos_cone*sin_cone
+    l82 = (0.75)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fyfy - (0.75)*b_fxfx - (0.75)*b_fyfy*(sin_cone*sin_cone)
+    l83 = (1.5)*b_fxfy*(sin_cone*sin_cone) - (1.5)*b_fxfy
+    l84 = (1.5)*b_fxfx*(cos_cone*cos_cone) + (0.75)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fxfx + (1.5)*b_fyfy*(cos_cone*cos_cone) + (0.75)*b_fyfy*(sin_cone*sin_cone) + (0.75)*b_fyfy - (1.5)*b_rsff*(sin_cone*sin_cone) - (1.5)*b_rsff
+    l85 = (1.5)*b_m2*(sin_cone*sin_cone) + (1.5)*b_m2
+    l86 = h_m + 3.0*b_m
+    l87 = 3.0*b_fxey*cos_cone - 3.0*b_fyex*cos_cone
+    l88 = 6.0*b_fxey*sin_cone - 6.0*b_fyex*sin_cone
+    l89 = gravity*t_gfa - t_ka
+    l90 = gravity*t_gss - t_ks
+    l91 = 3.0*cos_cone
+    l92 = (tg_e*tg_e)
+    l93 = (1.0/g_ratio)
+    l94 = g_ratio*g_rigid/g_efficiency
+    l95 = g_i*(g_ratio*g_ratio)*g_rigid/g_efficiency
+    l96 = b_fxfx + b_fyfy
+    l97 = b_fxex + b_fyey
+    l98 = 3.0*b_exex + 3.0*b_eyey
+    l99 = b_sfe*sin_cone
+    l100 = b_fx*cos_cone
+    l101 = b_fy*cos_cone
+    l102 = b_fxey*sin_cone - b_fyex*sin_cone
+    l103 = b_rfy*cos_cone
+    l104 = b_rfx*cos_cone
+    l105 = b_sfe*cos_cone
+    l106 = b_fx*sin_cone
+    l107 = b_fy*sin_cone
+    l108 = b_fxey*cos_cone - b_fyex*cos_cone
+    l109 = b_rfy*sin_cone
+    l110 = b_rfx*sin_cone
+    l111 = b_sff*sin_cone
+    l112 = b_sff*cos_cone
+    l113 = (0.5)*b_fxex*(cos_cone*cos_cone) - (0.5)*b_fyey*(cos_cone*cos_cone)
+    l114 = (0.5)*b_fxey*(cos_cone*cos_cone) + (0.5)*b_fyex*(cos_cone*cos_cone)
+    l115 = (0.5)*b_fxex*(cos_cone*cos_cone) + b_fxex*(sin_cone*sin_cone) + (0.5)*b_fyey*(cos_cone*cos_cone) + b_fyey*(sin_cone*sin_cone) - b_rsfe*(cos_cone*cos_cone)
+    l116 = b_rfx*cos_cone*sin_cone
+    l117 = b_rfy*cos_cone*sin_cone
+    l118 = (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fyey - (0.5)*b_fxex - (0.5)*b_fyey*(sin_cone*sin_cone)
+    l119 = (0.5)*b_fxey*(sin_cone*sin_cone) + (0.5)*b_fyex*(sin_cone*sin_cone) - (0.5)*b_fxey - (0.5)*b_fyex
+    l120 = b_fxex*(cos_cone*cos_cone) + (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fxex + b_fyey*(cos_cone*cos_cone) + (0.5)*b_fyey*(sin_cone*sin_cone) + (0.5)*b_fyey - b_rsfe - b_rsfe*(sin_cone*sin_cone)
+    l121 = 2.0*b_fxey*sin_cone - 2.0*b_fyex*sin_cone
+    l122 = b_fxey*cos_cone + b_fyex*cos_cone
+    l123 = b_fxex*cos_cone - b_fyey*cos_cone
+    l124 = b_fxex*cos_cone*sin_cone - b_fyey*cos_cone*sin_cone
+    l125 = b_fxey*cos_cone*sin_cone + b_fyex*cos_cone*sin_cone
+    l126 = b_fxex*cos_cone*sin_cone + b_fyey*cos_cone*sin_cone + 2.0*b_rsfe*cos_cone*sin_cone
+    l127 = b_rfx*(cos_cone*cos_cone) - b_rfx*(sin_cone*sin_cone)
+    l128 = b_rfy*(cos_cone*cos_cone) - b_rfy*(sin_cone*sin_cone)
+    l129 = b_fxey*sin_cone + b_fyex*sin_cone
+    l130 = b_fxex*sin_cone - b_fyey*sin_cone
+    l131 = (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fxex - (0.5)*b_fyey*(sin_cone*sin_cone) - (0.5)*b_fyey
+    l132 = (0.5)*b_fxey*(sin_cone*sin_cone) + (0.5)*b_fxey + (0.5)*b_fyex*(sin_cone*sin_cone) + (0.5)*b_fyex
+    l133 = b_rsfe + b_fxex*(cos_cone*cos_cone) + (0.5)*b_fxex*(sin_cone*sin_cone) + b_fyey*(cos_cone*cos_cone) + (0.5)*b_fyey*(sin_cone*sin_cone) - (0.5)*b_fxex - (0.5)*b_fyey - b_rsfe*(sin_cone*sin_cone)
+    l134 = 2.0*b_fxey*cos_cone - 2.0*b_fyex*cos_cone
+    l135 = (0.5)*b_fxfx*(cos_cone*cos_cone) - (0.5)*b_fyfy*(cos_cone*cos_cone)
+    l136 = b_fxfy*(cos_cone*cos_cone)
+    l137 = (0.5)*b_fxfx*(cos_cone*cos_cone) + b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fyfy*(cos_cone*cos_cone) + b_fyfy*(sin_cone*sin_cone) - b_rsff*(cos_cone*cos_cone)
+    l138 = (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fyfy - (0.5)*b_fxfx - (0.5)*b_fyfy*(sin_cone*sin_cone)
+    l139 = b_fxfy*(sin_cone*sin_cone) - b_fxfy
+    l140 = b_fxfx*(cos_cone*cos_cone) + (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fxfx + b_fyfy*(cos_cone*cos_cone) + (0.5)*b_fyfy*(sin_cone*sin_cone) + (0.5)*b_fyfy - b_rsff - b_rsff*(sin_cone*sin_cone)
+    l141 = 2.0*b_fxfy*cos_cone
+    l142 = b_fxfx*cos_cone - b_fyfy*cos_cone
+    l143 = b_fxfx*cos_cone*sin_cone - b_fyfy*cos_cone*sin_cone
+    l144 = 2.0*b_fxfy*cos_cone*sin_cone
+    l145 = b_fxfx*cos_cone*sin_cone + b_fyfy*cos_cone*sin_cone + 2.0*b_rsff*cos_cone*sin_cone
+    l146 = 2.0*b_fxfy*sin_cone
+    l147 = b_fxfx*sin_cone - b_fyfy*sin_cone
+    l148 = (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fxfx - (0.5)*b_fyfy*(sin_cone*sin_cone) - (0.5)*b_fyfy
+    l149 = b_fxfy + b_fxfy*(sin_cone*sin_cone)
+    l150 = b_rsff + b_fxfx*(cos_cone*cos_cone) + (0.5)*b_fxfx*(sin_cone*sin_cone) + b_fyfy*(cos_cone*cos_cone) + (0.5)*b_fyfy*(sin_cone*sin_cone) - (0.5)*b_fxfx - (0.5)*b_fyfy - b_rsff*(sin_cone*sin_cone)
+    l151 = (1.0/l96)
+    l152 = l151*l97
+    l153 = 3.0*l152*l97 - l98
+    l154 = (1.0/l153)
+    l155 = g_efficiency/g_ratio
+    l156 = (1.0/g_i)
+    l157 = g_ratio*g_rigid
+    l158 = (0.5)*b_fxfx - (0.5)*b_fyfy
+    l159 = (0.5)*b_fxfx + (0.5)*b_fyfy
+    l160 = (0.5)*b_exex - (0.5)*b_eyey
+    l161 = (0.5)*b_exex + (0.5)*b_eyey
+    l162 = (0.5)*b_fxex - (0.5)*b_fyey
+    l163 = (0.5)*b_fxey + (0.5)*b_fyex
+    l164 = (0.5)*b_fxex + (0.5)*b_fyey
+    l165 = (0.5)*b_fxey - (0.5)*b_fyex
     return np.array([
         b_m,
         b_m1,
@@ -559,6 +709,156 @@ def constants(parameters):
         l13,
         l14,
         l15,
+        l16,
+        l17,
+        l18,
+        l19,
+        l20,
+        l21,
+        l22,
+        l23,
+        l24,
+        l25,
+        l26,
+        l27,
+        l28,
+        l29,
+        l30,
+        l31,
+        l32,
+        l33,
+        l34,
+        l35,
+        l36,
+        l37,
+        l38,
+        l39,
+        l40,
+        l41,
+        l42,
+        l43,
+        l44,
+        l45,
+        l46,
+        l47,
+        l48,
+        l49,
+        l50,
+        l51,
+        l52,
+        l53,
+        l54,
+        l55,
+        l56,
+        l57,
+        l58,
+        l59,
+        l60,
+        l61,
+        l62,
+        l63,
+        l64,
+        l65,
+        l66,
+        l67,
+        l68,
+        l69,
+        l70,
+        l71,
+        l72,
+        l73,
+        l74,
+        l75,
+        l76,
+        l77,
+        l78,
+        l79,
+        l80,
+        l81,
+        l82,
+        l83,
+        l84,
+        l85,
+        l86,
+        l87,
+        l88,
+        l89,
+        l90,
+        l91,
+        l92,
+        l93,
+        l94,
+        l95,
+        l96,
+        l97,
+        l98,
+        l99,
+        l100,
+        l101,
+        l102,
+        l103,
+        l104,
+        l105,
+        l106,
+        l107,
+        l108,
+        l109,
+        l110,
+        l111,
+        l112,
+        l113,
+        l114,
+        l115,
+        l116,
+        l117,
+        l118,
+        l119,
+        l120,
+        l121,
+        l122,
+        l123,
+        l124,
+        l125,
+        l126,
+        l127,
+        l128,
+        l129,
+        l130,
+        l131,
+        l132,
+        l133,
+        l134,
+        l135,
+        l136,
+        l137,
+        l138,
+        l139,
+        l140,
+        l141,
+        l142,
+        l143,
+        l144,
+        l145,
+        l146,
+        l147,
+        l148,
+        l149,
+        l150,
+        l151,
+        l152,
+        l153,
+        l154,
+        l155,
+        l156,
+        l157,
+        l158,
+        l159,
+        l160,
+        l161,
+        l162,
+        l163,
+        l164,
+        l165,
     ], dtype=np.float64)
 
 
@@ -1261,6 +1561,165 @@ theta_s = 2.0*theta_half_cos*theta_half_sin
 theta_c = 1.0 - 2.0*(theta_half_sin*theta_half_sin)
 theta_ss = 2.0*theta_c*theta_s
 theta_cc = 1.0 - 2.0*(theta_s*theta_s)
+l5 = constants[259]
+l6 = constants[260]
+k5_turned = l5*theta_c + l6*theta_s
+l7 = constants[261]
+l8 = constants[262]
+k6_turned = l7*theta_c + l8*theta_s
+l12 = constants[266]
+l13 = constants[267]
+k10_turned = l12*theta_c - l13*theta_s
+l14 = constants[268]
+l15 = constants[269]
+k11_turned = l14*theta_c + l15*theta_s
+l23 = constants[277]
+l24 = constants[278]
+k19_turned = l23*theta_c - l24*theta_s
+l26 = constants[280]
+l27 = constants[281]
+k21_turned = l26*theta_c - l27*theta_s
+l28 = constants[282]
+l29 = constants[283]
+k22_turned = l28*theta_c + l29*theta_s
+l30 = constants[284]
+l31 = constants[285]
+k23_turned = l30*theta_c - l31*theta_s
+l32 = constants[286]
+l33 = constants[287]
+l34 = constants[288]
+k24_turned = l34 - l32*theta_cc - l33*theta_ss
+l35 = constants[289]
+l36 = constants[290]
+l37 = constants[291]
+k25_turned = l37 - l35*theta_cc - l36*theta_ss
+l38 = constants[292]
+l39 = constants[293]
+k26_turned = l38*theta_c + l39*theta_s
+l40 = constants[294]
+l41 = constants[295]
+k27_turned = l40*theta_c + l41*theta_s
+l42 = constants[296]
+l43 = constants[297]
+l44 = constants[298]
+k28_turned = l44 - l42*theta_cc - l43*theta_ss
+l46 = constants[300]
+l47 = constants[301]
+k30_turned = l46*theta_cc - l47*theta_ss
+l48 = constants[302]
+l49 = constants[303]
+l50 = constants[304]
+k31_turned = l50 + l48*theta_cc + l49*theta_ss
+l51 = constants[305]
+l52 = constants[306]
+k32_turned = l51*theta_c + l52*theta_s
+l53 = constants[307]
+l54 = constants[308]
+k33_turned = l53*theta_cc - l54*theta_ss
+l55 = constants[309]
+l56 = constants[310]
+l57 = constants[311]
+k34_turned = l57 + l55*theta_cc + l56*theta_ss
+l58 = constants[312]
+l59 = constants[313]
+k35_turned = l58*theta_cc - l59*theta_ss
+l60 = constants[314]
+l61 = constants[315]
+l62 = constants[316]
+k36_turned = l62 - l60*theta_cc - l61*theta_ss
+l63 = constants[317]
+l64 = constants[318]
+k37_turned = l63*theta_c - l64*theta_s
+l65 = constants[319]
+l66 = constants[320]
+k38_turned = l65*theta_c + l66*theta_s
+l67 = constants[321]
+l68 = constants[322]
+k39_turned = l67*theta_cc - l68*theta_ss
+l69 = constants[323]
+l70 = constants[324]
+l71 = constants[325]
+k40_turned = l71 - l69*theta_cc - l70*theta_ss
+l72 = constants[326]
+l73 = constants[327]
+l74 = constants[328]
+k41_turned = l74 - l72*theta_cc - l73*theta_ss
+l75 = constants[329]
+l76 = constants[330]
+l77 = constants[331]
+k42_turned = l77 - l75*theta_cc - l76*theta_ss
+l78 = constants[332]
+l79 = constants[333]
+k43_turned = l78*theta_c + l79*theta_s
+l80 = constants[334]
+l81 = constants[335]
+k44_turned = l80*theta_c + l81*theta_s
+l82 = constants[336]
+l83 = constants[337]
+l84 = constants[338]
+k45_turned = l84 - l82*theta_cc - l83*theta_ss
+l100 = constants[354]
+l101 = constants[355]
+k61_turned = l100*theta_c + l101*theta_s
+l103 = constants[357]
+l104 = constants[358]
+k63_turned = l103*theta_c - l104*theta_s
+l106 = constants[360]
+l107 = constants[361]
+k65_turned = l106*theta_c + l107*theta_s
+l109 = constants[363]
+l110 = constants[364]
+k67_turned = l109*theta_c - l110*theta_s
+l113 = constants[367]
+l114 = constants[368]
+l115 = constants[369]
+k70_turned = l115 - l113*theta_cc - l114*theta_ss
+l116 = constants[370]
+l117 = constants[371]
+k71_turned = l116*theta_c + l117*theta_s
+l118 = constants[372]
+l119 = constants[373]
+l120 = constants[374]
+k72_turned = l120 - l118*theta_cc - l119*theta_ss
+l122 = constants[376]
+l123 = constants[377]
+k74_turned = l122*theta_cc - l123*theta_ss
+l124 = constants[378]
+l125 = constants[379]
+l126 = constants[380]
+k75_turned = l126 + l124*theta_cc + l125*theta_ss
+l127 = constants[381]
+l128 = constants[382]
+k76_turned = l127*theta_c + l128*theta_s
+l129 = constants[383]
+l130 = constants[384]
+k77_turned = l129*theta_cc - l130*theta_ss
+l131 = constants[385]
+l132 = constants[386]
+l133 = constants[387]
+k78_turned = l133 - l131*theta_cc - l132*theta_ss
+l135 = constants[389]
+l136 = constants[390]
+l137 = constants[391]
+k80_turned = l137 - l135*theta_cc - l136*theta_ss
+l138 = constants[392]
+l139 = constants[393]
+l140 = constants[394]
+k81_turned = l140 - l138*theta_cc - l139*theta_ss
+l141 = constants[395]
+l142 = constants[396]
+k82_turned = l141*theta_cc - l142*theta_ss
+l143 = constants[397]
+l144 = constants[398]
+l145 = constants[399]
+k83_turned = l145 + l143*theta_cc + l144*theta_ss
+l146 = constants[400]
+l147 = constants[401]
+k84_turned = l146*theta_cc - l147*theta_ss
+l148 = constants[402]
+l149 = constants[403]
+l150 = constants[404]
+k85_turned = l150 - l148*theta_cc - l149*theta_ss
 b_fx = constants[3]
 b_fy = constants[4]
 b_fx_turned = b_fx*theta_c + b_fy*theta_s
@@ -1286,33 +1745,29 @@ b_tip_ey = constants[35]
 b_tip_ex_turned = b_tip_ex*theta_c + b_tip_ey*theta_s
 b_tip_ey_turned = b_tip_ey*theta_c - b_tip_ex*theta_s
 b_fxfy = constants[13]
-l8 = constants[262]
-u0 = b_fxfy*theta_ss + l8*theta_cc
-l9 = constants[263]
-b_fxfx_turned = l9 + u0
-b_fyfy_turned = l9 - u0
-b_fxfy_turned = b_fxfy*theta_cc - l8*theta_ss
+l158 = constants[412]
+u0 = b_fxfy*theta_ss + l158*theta_cc
+l159 = constants[413]
+b_fxfx_turned = l159 + u0
+b_fyfy_turned = l159 - u0
+b_fxfy_turned = b_fxfy*theta_cc - l158*theta_ss
 b_exey = constants[16]
-l10 = constants[264]
-u1 = b_exey*theta_ss + l10*theta_cc
-l11 = constants[265]
-b_exex_turned = l11 + u1
-b_eyey_turned = l11 - u1
-b_exey_turned = b_exey*theta_cc - l10*theta_ss
-l12 = constants[266]
-l13 = constants[267]
-u2 = l12*theta_cc + l13*theta_ss
-l14 = constants[268]
-b_fxex_turned = l14 + u2
-b_fyey_turned = l14 - u2
-u3 = l12*theta_ss
-l15 = constants[269]
-b_fxey_turned = l15 + l13*theta_cc - u3
-b_fyex_turned = l13*theta_cc - l15 - u3
-f1d = x[10]
-f2d = x[11]
-f3d = x[12]
-d_mean = (0.3333333333333333)*f1d + (0.3333333333333333)*f2d + (0.3333333333333333)*f3d
+l160 = constants[414]
+u1 = b_exey*theta_ss + l160*theta_cc
+l161 = constants[415]
+b_exex_turned = l161 + u1
+b_eyey_turned = l161 - u1
+b_exey_turned = b_exey*theta_cc - l160*theta_ss
+l162 = constants[416]
+l163 = constants[417]
+u2 = l162*theta_cc + l163*theta_ss
+l164 = constants[418]
+b_fxex_turned = l164 + u2
+b_fyey_turned = l164 - u2
+u3 = l162*theta_ss
+l165 = constants[419]
+b_fxey_turned = l165 + l163*theta_cc - u3
+b_fyex_turned = l163*theta_cc - l165 - u3
 a = x[0]
 t_slope_fa = constants[68]
 pitch_angle = a*t_slope_fa
@@ -1431,353 +1886,210 @@ skew_sin = (-u18) - u19
 uniform_mean = cos_tilt*w_fold_mean
 uniform_cos = cos_tilt*w_fold_cos
 uniform_sin = cos_tilt*w_fold_sin
-add = derivative[8]
-sdd = derivative[9]
-hub_full_x = acc_f_s_x + add*tha_s_x + sdd*ths_s_x
-hub_full_y = acc_f_y + add*tha_y + sdd*ths_y
-hub_full_z = acc_f_z + add*tha_z + sdd*ths_z
-phidd = derivative[14]
-hub_fullspin_x = phidd + spin_f_s_x + add*wha_s_x + sdd*whs_s_x
-hub_fullspin_y = spin_h_y + add*wha_y + sdd*whs_y
-hub_fullspin_z = spin_h_z + add*wha_z + sdd*whs_z
-cos_cone = constants[39]
-u21 = cos_cone*wf_x
-sin_cone = constants[40]
-lw_c1_x = u21 - sin_cone*won_z
-u22 = sin_cone*wf_x
-lw_c1_z = u22 + cos_cone*won_z
-u23 = cos_cone*hub_full_x
-lg_c1_x = u23 - hub_full_z*sin_cone
-u24 = hub_full_x*sin_cone
-lg_c1_z = u24 + cos_cone*hub_full_z
-u25 = cos_cone*hub_fullspin_x
-lsp_c1_x = u25 - hub_fullspin_z*sin_cone
-u26 = hub_fullspin_x*sin_cone
-lsp_c1_z = u26 + cos_cone*hub_fullspin_z
-e = x[5]
-u27 = b_ex_turned*e
 f1 = x[2]
-bs1_x = u27 + b_fx_turned*f1
-u28 = b_ey_turned*e
-bs1_y = u28 + b_fy_turned*f1
-u29 = (f1*f1)
-b_sff = constants[21]
-u30 = (0.5)*b_sff
-b_sfe = constants[22]
-u31 = b_sfe*f1
-u32 = (e*e)
-b_m1 = constants[1]
-b_see = constants[23]
-u33 = (0.5)*b_see*u32 - b_m1
-bs1_z = (-u33) - e*u31 - u29*u30
-u34 = 2.0*e
-u35 = b_fyey_turned*u34
-u36 = b_fyfy_turned*u29 + f1*u35
-u37 = b_eyey_turned*u32
-b_m2 = constants[2]
-b_rsee = constants[26]
-u38 = b_m2 - b_rsee*u32
-u39 = u37 + u38
-b_rsfe = constants[25]
-u40 = b_rsfe*u34
-b_rsff = constants[24]
-u41 = (-b_rsff*u29) - f1*u40
-bi1_xx = u36 + u39 + u41
-u42 = b_exey_turned*u32
-u43 = b_fxey_turned + b_fyex_turned
-u44 = f1*u43
-bi1_xy = (-u42) - b_fxfy_turned*u29 - e*u44
-u45 = b_rex_turned*e
-bi1_xz = (-u45) - b_rfx_turned*f1
-u46 = b_fxex_turned*u34
-u47 = b_fxfx_turned*u29 + f1*u46
-u48 = b_exex_turned*u32
-u49 = u38 + u48
-bi1_yy = u41 + u47 + u49
-u50 = b_rey_turned*e
-bi1_yz = (-u50) - b_rfy_turned*f1
-u51 = u37 + u48
-bi1_zz = u36 + u47 + u51
-u52 = -b_rsee*u34
-u53 = 2.0*f1
-u54 = u52 - b_rsfe*u53
-u55 = b_eyey_turned*u34
-u56 = u55 + b_fyey_turned*u53
-u57 = -u40
-u58 = u57 - b_rsff*u53
-u59 = u35 + b_fyfy_turned*u53
-ed = x[13]
-bid1_xx = ed*(u54 + u56) + f1d*(u58 + u59)
-u60 = b_exey_turned*u34
-u61 = e*u43
-bid1_xy = ed*((-u44) - u60) + f1d*((-u61) - b_fxfy_turned*u53)
-u62 = b_rex_turned*ed
-u63 = u62 + b_rfx_turned*f1d
-bid1_xz = -u63
-u64 = b_exex_turned*u34
-u65 = u64 + b_fxex_turned*u53
-u66 = u46 + b_fxfx_turned*u53
-bid1_yy = ed*(u54 + u65) + f1d*(u58 + u66)
-u67 = b_rey_turned*ed
-u68 = b_rfy_turned*f1d
-bid1_yz = (-u67) - u68
-bid1_zz = ed*(u56 + u65) + f1d*(u59 + u66)
-u69 = 2.0*ed
-u70 = b_ex_turned*u69
-u71 = 2.0*f1d
-blade1_whirl_x = u70 + b_fx_turned*u71 + bs1_z*won_y - bs1_y*lw_c1_z
-u72 = b_ey_turned*u69
-blade1_whirl_y = u72 + b_fy_turned*u71 + bs1_x*lw_c1_z - bs1_z*lw_c1_x
-u73 = b_see*e
-u74 = (-u31) - u73
-u75 = b_sfe*e
-u76 = (-u75) - b_sff*f1
-blade1_whirl_z = bs1_y*lw_c1_x + u69*u74 + u71*u76 - bs1_x*won_y
-u77 = -u67
-blade1_momentum_x = u77 + bi1_xx*lw_c1_x + bi1_xy*won_y + bi1_xz*lw_c1_z - u68
-blade1_momentum_y = u63 + bi1_xy*lw_c1_x + bi1_yy*won_y + bi1_yz*lw_c1_z
-u78 = b_fyex_turned - b_fxey_turned
-u79 = e*u78
-blade1_momentum_z = bi1_xz*lw_c1_x + bi1_yz*won_y + bi1_zz*lw_c1_z + f1d*u79 - ed*f1*u78
-b_m = constants[0]
-blade1_force_x = b_m*lg_c1_x + blade1_whirl_z*won_y + bs1_z*hub_fullspin_y - blade1_whirl_y*lw_c1_z - bs1_y*lsp_c1_z
-blade1_force_y = b_m*hub_full_y + blade1_whirl_x*lw_c1_z + bs1_x*lsp_c1_z - blade1_whirl_z*lw_c1_x - bs1_z*lsp_c1_x
-u80 = b_see*(ed*ed)
-u81 = b_sfe*u69
-blade1_force_z = b_m*lg_c1_z + blade1_whirl_y*lw_c1_x + bs1_y*lsp_c1_x - u80 - b_sff*(f1d*f1d) - blade1_whirl_x*won_y - bs1_x*hub_fullspin_y - f1d*u81
-blade1_moment_x = bi1_xx*lsp_c1_x + bi1_xy*hub_fullspin_y + bi1_xz*lsp_c1_z + bid1_xx*lw_c1_x + bid1_xy*won_y + bid1_xz*lw_c1_z + blade1_momentum_z*won_y + bs1_y*lg_c1_z - blade1_momentum_y*lw_c1_z - bs1_z*hub_full_y
-blade1_moment_y = bi1_xy*lsp_c1_x + bi1_yy*hub_fullspin_y + bi1_yz*lsp_c1_z + bid1_xy*lw_c1_x + bid1_yy*won_y + bid1_yz*lw_c1_z + blade1_momentum_x*lw_c1_z + bs1_z*lg_c1_x - blade1_momentum_z*lw_c1_x - bs1_x*lg_c1_z
-blade1_moment_z = bi1_xz*lsp_c1_x + bi1_yz*hub_fullspin_y + bi1_zz*lsp_c1_z + bid1_xz*lw_c1_x + bid1_yz*won_y + bid1_zz*lw_c1_z + blade1_momentum_y*lw_c1_x + bs1_x*hub_full_y - blade1_momentum_x*won_y - bs1_y*lg_c1_x
-edd = derivative[13]
-u82 = b_ex_turned*edd
-u83 = uniform_cos + uniform_mean
-u84 = c_thrust*relative_x + c_thrust_edge*ed
-f1dd = derivative[10]
-blade1_net_x = pressure*(u84 + c_thrust_flap*f1d + c_thrust_kappa*kappa_cos + c_thrust_skew*skew_cos + c_thrust_w*u83 + c_thrust_y*relative_y) - blade1_force_x - u82 - b_fx_turned*f1dd
-u85 = b_ey_turned*edd
-u86 = c_tangential*relative_x + c_tangential_edge*ed
-blade1_net_y = pressure*((-u86) - c_tangential_flap*f1d - c_tangential_kappa*kappa_cos - c_tangential_skew*skew_cos - c_tangential_w*u83 - c_tangential_y*relative_y) - blade1_force_y - u85 - b_fy_turned*f1dd
-blade1_net_z = (-blade1_force_z) - edd*u74 - f1dd*u76
-u87 = b_rey_turned*edd
-u88 = c_torque*relative_x + c_torque_edge*ed
-u89 = pressure*radius
-blade1_netm_x = u87 + b_rfy_turned*f1dd + u89*(u88 + c_torque_flap*f1d + c_torque_kappa*kappa_cos + c_torque_skew*skew_cos + c_torque_w*u83 + c_torque_y*relative_y) - blade1_moment_x
-u90 = b_rex_turned*edd
-u91 = c_bending*relative_x + c_bending_edge*ed
-blade1_netm_y = pressure*radius*(u91 + c_bending_flap*f1d + c_bending_kappa*kappa_cos + c_bending_skew*skew_cos + c_bending_w*u83 + c_bending_y*relative_y) - blade1_moment_y - u90 - b_rfx_turned*f1dd
-blade1_netm_z = edd*f1*u78 - blade1_moment_z - f1dd*u79
-u92 = (0.5)*won_y
-half_sqrt3 = 0.8660254037844386
-u93 = half_sqrt3*won_z
-lw_2_y = u93 - u92
-u94 = (0.5)*won_z
-u95 = half_sqrt3*won_y
-lw_2_z = (-u94) - u95
-lw_c2_x = u21 - lw_2_z*sin_cone
-lw_c2_z = u22 + cos_cone*lw_2_z
-u96 = (0.5)*hub_full_y
-u97 = half_sqrt3*hub_full_z
-lg_2_y = u97 - u96
-u98 = (0.5)*hub_full_z
-u99 = half_sqrt3*hub_full_y
-lg_2_z = (-u98) - u99
-lg_c2_x = u23 - lg_2_z*sin_cone
-lg_c2_z = u24 + cos_cone*lg_2_z
-u100 = (0.5)*hub_fullspin_y
-u101 = half_sqrt3*hub_fullspin_z
-lsp_2_y = u101 - u100
-u102 = (0.5)*hub_fullspin_z
-u103 = half_sqrt3*hub_fullspin_y
-lsp_2_z = (-u102) - u103
-lsp_c2_x = u25 - lsp_2_z*sin_cone
-lsp_c2_z = u26 + cos_cone*lsp_2_z
 f2 = x[3]
-bs2_x = u27 + b_fx_turned*f2
-bs2_y = u28 + b_fy_turned*f2
-u104 = (f2*f2)
-bs2_z = (-u33) - f2*u75 - u104*u30
-u105 = b_fyfy_turned*u104 + f2*u35
-u106 = (-b_rsff*u104) - f2*u40
-bi2_xx = u105 + u106 + u39
-bi2_xy = (-u42) - b_fxfy_turned*u104 - f2*u61
-bi2_xz = (-u45) - b_rfx_turned*f2
-u107 = b_fxfx_turned*u104 + f2*u46
-bi2_yy = u106 + u107 + u49
-bi2_yz = (-u50) - b_rfy_turned*f2
-bi2_zz = u105 + u107 + u51
-u108 = 2.0*f2
-u109 = u52 - b_rsfe*u108
-u110 = u55 + b_fyey_turned*u108
-u111 = u57 - b_rsff*u108
-u112 = u35 + b_fyfy_turned*u108
-bid2_xx = ed*(u109 + u110) + f2d*(u111 + u112)
-bid2_xy = ed*((-u60) - f2*u43) + f2d*((-u61) - b_fxfy_turned*u108)
-u113 = u62 + b_rfx_turned*f2d
-bid2_xz = -u113
-u114 = u64 + b_fxex_turned*u108
-u115 = u46 + b_fxfx_turned*u108
-bid2_yy = ed*(u109 + u114) + f2d*(u111 + u115)
-u116 = b_rfy_turned*f2d
-bid2_yz = (-u116) - u67
-bid2_zz = ed*(u110 + u114) + f2d*(u112 + u115)
-u117 = 2.0*f2d
-blade2_whirl_x = u70 + b_fx_turned*u117 + bs2_z*lw_2_y - bs2_y*lw_c2_z
-blade2_whirl_y = u72 + b_fy_turned*u117 + bs2_x*lw_c2_z - bs2_z*lw_c2_x
-u118 = (-u73) - b_sfe*f2
-u119 = (-u75) - b_sff*f2
-blade2_whirl_z = bs2_y*lw_c2_x + u117*u119 + u118*u69 - bs2_x*lw_2_y
-blade2_momentum_x = u77 + bi2_xx*lw_c2_x + bi2_xy*lw_2_y + bi2_xz*lw_c2_z - u116
-blade2_momentum_y = u113 + bi2_xy*lw_c2_x + bi2_yy*lw_2_y + bi2_yz*lw_c2_z
-blade2_momentum_z = bi2_xz*lw_c2_x + bi2_yz*lw_2_y + bi2_zz*lw_c2_z + f2d*u79 - ed*f2*u78
-blade2_force_x = b_m*lg_c2_x + blade2_whirl_z*lw_2_y + bs2_z*lsp_2_y - blade2_whirl_y*lw_c2_z - bs2_y*lsp_c2_z
-blade2_force_y = b_m*lg_2_y + blade2_whirl_x*lw_c2_z + bs2_x*lsp_c2_z - blade2_whirl_z*lw_c2_x - bs2_z*lsp_c2_x
-blade2_force_z = b_m*lg_c2_z + blade2_whirl_y*lw_c2_x + bs2_y*lsp_c2_x - u80 - b_sff*(f2d*f2d) - blade2_whirl_x*lw_2_y - bs2_x*lsp_2_y - f2d*u81
-blade2_moment_x = bi2_xx*lsp_c2_x + bi2_xy*lsp_2_y + bi2_xz*lsp_c2_z + bid2_xx*lw_c2_x + bid2_xy*lw_2_y + bid2_xz*lw_c2_z + blade2_momentum_z*lw_2_y + bs2_y*lg_c2_z - blade2_momentum_y*lw_c2_z - bs2_z*lg_2_y
-blade2_moment_y = bi2_xy*lsp_c2_x + bi2_yy*lsp_2_y + bi2_yz*lsp_c2_z + bid2_xy*lw_c2_x + bid2_yy*lw_2_y + bid2_yz*lw_c2_z + blade2_momentum_x*lw_c2_z + bs2_z*lg_c2_x - blade2_momentum_z*lw_c2_x - bs2_x*lg_c2_z
-blade2_moment_z = bi2_xz*lsp_c2_x + bi2_yz*lsp_2_y + bi2_zz*lsp_c2_z + bid2_xz*lw_c2_x + bid2_yz*lw_2_y + bid2_zz*lw_c2_z + blade2_momentum_y*lw_c2_x + bs2_x*lg_2_y - blade2_momentum_x*lw_2_y - bs2_y*lg_c2_x
-u120 = (0.5)*kappa_cos
-u121 = half_sqrt3*kappa_sin
-u122 = u121 - u120
-u123 = (0.5)*skew_cos
-u124 = half_sqrt3*skew_sin
-u125 = u124 - u123
-u126 = (0.5)*uniform_cos
-u127 = half_sqrt3*uniform_sin
-u128 = u127 + uniform_mean - u126
-u129 = (0.5)*relative_y
-u130 = half_sqrt3*relative_z
-u131 = u130 - u129
-f2dd = derivative[11]
-blade2_net_x = pressure*(u84 + c_thrust_flap*f2d + c_thrust_kappa*u122 + c_thrust_skew*u125 + c_thrust_w*u128 + c_thrust_y*u131) - blade2_force_x - u82 - b_fx_turned*f2dd
-blade2_net_y = pressure*((-u86) - c_tangential_flap*f2d - c_tangential_kappa*u122 - c_tangential_skew*u125 - c_tangential_w*u128 - c_tangential_y*u131) - blade2_force_y - u85 - b_fy_turned*f2dd
-blade2_net_z = (-blade2_force_z) - edd*u118 - f2dd*u119
-blade2_netm_x = u87 + b_rfy_turned*f2dd + u89*(u88 + c_torque_flap*f2d + c_torque_kappa*u122 + c_torque_skew*u125 + c_torque_w*u128 + c_torque_y*u131) - blade2_moment_x
-blade2_netm_y = pressure*radius*(u91 + c_bending_flap*f2d + c_bending_kappa*u122 + c_bending_skew*u125 + c_bending_w*u128 + c_bending_y*u131) - blade2_moment_y - u90 - b_rfx_turned*f2dd
-blade2_netm_z = edd*f2*u78 - blade2_moment_z - f2dd*u79
-lw_3_y = (-u92) - u93
-lw_3_z = u95 - u94
-lw_c3_x = u21 - lw_3_z*sin_cone
-lw_c3_z = u22 + cos_cone*lw_3_z
-lg_3_y = (-u96) - u97
-lg_3_z = u99 - u98
-lg_c3_x = u23 - lg_3_z*sin_cone
-lg_c3_z = u24 + cos_cone*lg_3_z
-lsp_3_y = (-u100) - u101
-lsp_3_z = u103 - u102
-lsp_c3_x = u25 - lsp_3_z*sin_cone
-lsp_c3_z = u26 + cos_cone*lsp_3_z
 f3 = x[4]
-bs3_x = u27 + b_fx_turned*f3
-bs3_y = u28 + b_fy_turned*f3
-u132 = (f3*f3)
-bs3_z = (-u33) - f3*u75 - u132*u30
-u133 = b_fyfy_turned*u132 + f3*u35
-u134 = (-b_rsff*u132) - f3*u40
-bi3_xx = u133 + u134 + u39
-bi3_xy = (-u42) - b_fxfy_turned*u132 - f3*u61
-bi3_xz = (-u45) - b_rfx_turned*f3
-u135 = b_fxfx_turned*u132 + f3*u46
-bi3_yy = u134 + u135 + u49
-bi3_yz = (-u50) - b_rfy_turned*f3
-bi3_zz = u133 + u135 + u51
-u136 = 2.0*f3
-u137 = u52 - b_rsfe*u136
-u138 = u55 + b_fyey_turned*u136
-u139 = u57 - b_rsff*u136
-u140 = u35 + b_fyfy_turned*u136
-bid3_xx = ed*(u137 + u138) + f3d*(u139 + u140)
-bid3_xy = ed*((-u60) - f3*u43) + f3d*((-u61) - b_fxfy_turned*u136)
-u141 = u62 + b_rfx_turned*f3d
-bid3_xz = -u141
-u142 = u64 + b_fxex_turned*u136
-u143 = u46 + b_fxfx_turned*u136
-bid3_yy = ed*(u137 + u142) + f3d*(u139 + u143)
-u144 = b_rfy_turned*f3d
-bid3_yz = (-u144) - u67
-bid3_zz = ed*(u138 + u142) + f3d*(u140 + u143)
-u145 = 2.0*f3d
-blade3_whirl_x = u70 + b_fx_turned*u145 + bs3_z*lw_3_y - bs3_y*lw_c3_z
-blade3_whirl_y = u72 + b_fy_turned*u145 + bs3_x*lw_c3_z - bs3_z*lw_c3_x
-u146 = (-u73) - b_sfe*f3
-u147 = (-u75) - b_sff*f3
-blade3_whirl_z = bs3_y*lw_c3_x + u145*u147 + u146*u69 - bs3_x*lw_3_y
-blade3_momentum_x = u77 + bi3_xx*lw_c3_x + bi3_xy*lw_3_y + bi3_xz*lw_c3_z - u144
-blade3_momentum_y = u141 + bi3_xy*lw_c3_x + bi3_yy*lw_3_y + bi3_yz*lw_c3_z
-blade3_momentum_z = bi3_xz*lw_c3_x + bi3_yz*lw_3_y + bi3_zz*lw_c3_z + f3d*u79 - ed*f3*u78
-blade3_force_x = b_m*lg_c3_x + blade3_whirl_z*lw_3_y + bs3_z*lsp_3_y - blade3_whirl_y*lw_c3_z - bs3_y*lsp_c3_z
-blade3_force_y = b_m*lg_3_y + blade3_whirl_x*lw_c3_z + bs3_x*lsp_c3_z - blade3_whirl_z*lw_c3_x - bs3_z*lsp_c3_x
-blade3_force_z = b_m*lg_c3_z + blade3_whirl_y*lw_c3_x + bs3_y*lsp_c3_x - u80 - b_sff*(f3d*f3d) - blade3_whirl_x*lw_3_y - bs3_x*lsp_3_y - f3d*u81
-blade3_moment_x = bi3_xx*lsp_c3_x + bi3_xy*lsp_3_y + bi3_xz*lsp_c3_z + bid3_xx*lw_c3_x + bid3_xy*lw_3_y + bid3_xz*lw_c3_z + blade3_momentum_z*lw_3_y + bs3_y*lg_c3_z - blade3_momentum_y*lw_c3_z - bs3_z*lg_3_y
-blade3_moment_y = bi3_xy*lsp_c3_x + bi3_yy*lsp_3_y + bi3_yz*lsp_c3_z + bid3_xy*lw_c3_x + bid3_yy*lw_3_y + bid3_yz*lw_c3_z + blade3_momentum_x*lw_c3_z + bs3_z*lg_c3_x - blade3_momentum_z*lw_c3_x - bs3_x*lg_c3_z
-blade3_moment_z = bi3_xz*lsp_c3_x + bi3_yz*lsp_3_y + bi3_zz*lsp_c3_z + bid3_xz*lw_c3_x + bid3_yz*lw_3_y + bid3_zz*lw_c3_z + blade3_momentum_y*lw_c3_x + bs3_x*lg_3_y - blade3_momentum_x*lw_3_y - bs3_y*lg_c3_x
-u148 = (-u120) - u121
-u149 = (-u123) - u124
-u150 = uniform_mean - u126 - u127
-u151 = (-u129) - u130
-f3dd = derivative[12]
-blade3_net_x = pressure*(u84 + c_thrust_flap*f3d + c_thrust_kappa*u148 + c_thrust_skew*u149 + c_thrust_w*u150 + c_thrust_y*u151) - blade3_force_x - u82 - b_fx_turned*f3dd
-blade3_net_y = pressure*((-u86) - c_tangential_flap*f3d - c_tangential_kappa*u148 - c_tangential_skew*u149 - c_tangential_w*u150 - c_tangential_y*u151) - blade3_force_y - u85 - b_fy_turned*f3dd
-blade3_net_z = (-blade3_force_z) - edd*u146 - f3dd*u147
-blade3_netm_x = u87 + b_rfy_turned*f3dd + u89*(u88 + c_torque_flap*f3d + c_torque_kappa*u148 + c_torque_skew*u149 + c_torque_w*u150 + c_torque_y*u151) - blade3_moment_x
-blade3_netm_y = pressure*radius*(u91 + c_bending_flap*f3d + c_bending_kappa*u148 + c_bending_skew*u149 + c_bending_w*u150 + c_bending_y*u151) - blade3_moment_y - u90 - b_rfx_turned*f3dd
-blade3_netm_z = edd*f3*u78 - blade3_moment_z - f3dd*u79
-h_m = constants[43]
-rotor_force_x = blade1_net_x*cos_cone + blade1_net_z*sin_cone + blade2_net_x*cos_cone + blade2_net_z*sin_cone + blade3_net_x*cos_cone + blade3_net_z*sin_cone - h_m*hub_full_x
-rotor_force_y = blade1_net_y + half_sqrt3*(blade3_net_z*cos_cone - blade3_net_x*sin_cone) - (0.5)*blade2_net_y - (0.5)*blade3_net_y - h_m*hub_full_y - half_sqrt3*(blade2_net_z*cos_cone - blade2_net_x*sin_cone)
-rotor_force_z = blade1_net_z*cos_cone + (0.5)*blade2_net_x*sin_cone + blade2_net_y*half_sqrt3 + (0.5)*blade3_net_x*sin_cone - blade1_net_x*sin_cone - (0.5)*blade2_net_z*cos_cone - blade3_net_y*half_sqrt3 - (0.5)*blade3_net_z*cos_cone - h_m*hub_full_z
+f_mean = (0.3333333333333333)*f1 + (0.3333333333333333)*f2 + (0.3333333333333333)*f3
+f_cos = f1 - f_mean
+half_sqrt3 = 0.8660254037844386
+u21 = (0.5)/half_sqrt3
+f_sin = u21*(f2 - f3)
+f1d = x[10]
+f2d = x[11]
+f3d = x[12]
+d_mean = (0.3333333333333333)*f1d + (0.3333333333333333)*f2d + (0.3333333333333333)*f3d
+d_cos = f1d - d_mean
+d_sin = u21*(f2d - f3d)
+u22 = (f1*f1)
+ff_of_1 = u22
+u23 = (f2*f2)
+ff_of_2 = u23
+u24 = (f3*f3)
+ff_of_3 = u24
+ff_mean = (0.3333333333333333)*ff_of_1 + (0.3333333333333333)*ff_of_2 + (0.3333333333333333)*ff_of_3
+ff_cos = ff_of_1 - ff_mean
+ff_sin = u21*(ff_of_2 - ff_of_3)
+u25 = 2.0*f1
+fd_of_1 = f1d*u25
+u26 = 2.0*f2
+fd_of_2 = f2d*u26
+u27 = 2.0*f3
+fd_of_3 = f3d*u27
+fd_mean = (0.3333333333333333)*fd_of_1 + (0.3333333333333333)*fd_of_2 + (0.3333333333333333)*fd_of_3
+fd_cos = fd_of_1 - fd_mean
+fd_sin = u21*(fd_of_2 - fd_of_3)
+u28 = (f1d*f1d)
+dd_of_1 = u28
+u29 = (f2d*f2d)
+dd_of_2 = u29
+u30 = (f3d*f3d)
+dd_of_3 = u30
+dd_mean = (0.3333333333333333)*dd_of_1 + (0.3333333333333333)*dd_of_2 + (0.3333333333333333)*dd_of_3
+dd_cos = dd_of_1 - dd_mean
+dd_sin = u21*(dd_of_2 - dd_of_3)
+e = x[5]
+l3 = constants[257]
+u31 = e*l3
+l4 = constants[258]
+rs_x_slope = k5_turned - u31 - f_mean*l4
+l10 = constants[264]
+l9 = constants[263]
+rs_x = l10 + e*rs_x_slope + f_mean*k6_turned - ff_mean*l9
+rs_x_by_e = rs_x_slope - u31
+l11 = constants[265]
+rs_y_slope = f_sin*l11
+l16 = constants[270]
+rs_y = e*rs_y_slope + f_cos*k10_turned + f_sin*k11_turned + ff_sin*l16
+rs_z_slope = -f_cos*l11
+rs_z = e*rs_z_slope + f_sin*k10_turned - f_cos*k11_turned - ff_cos*l16
+u32 = d_mean*e
+ed = x[13]
+rsd_x = d_mean*k6_turned + ed*rs_x_by_e - fd_mean*l9 - l4*u32
+u33 = e*l11
+rsd_y = d_cos*k10_turned + d_sin*k11_turned + d_sin*u33 + ed*rs_y_slope + fd_sin*l16
+rsd_z = d_sin*k10_turned + ed*rs_z_slope - d_cos*k11_turned - d_cos*u33 - fd_cos*l16
+u34 = (ed*ed)
+l17 = constants[271]
+l18 = constants[272]
+l19 = constants[273]
+rsdd_x = (-d_mean*ed*l17) - dd_mean*l18 - l19*u34
+l20 = constants[274]
+u35 = ed*l20
+l21 = constants[275]
+rsdd_y = d_sin*u35 + dd_sin*l21
+rsdd_z = (-d_cos*u35) - dd_cos*l21
+l22 = constants[276]
+rle_x = f_mean*l22 - k19_turned
+l25 = constants[279]
+rle_y = -f_sin*l25
+rle_z = f_cos*l25
+rl_x = ed*rle_x - d_mean*k21_turned - l22*u32
+u36 = d_sin*k23_turned
+u37 = e*l25
+rl_y = d_cos*k22_turned + d_sin*u37 + ed*rle_y - u36
+u38 = d_cos*k23_turned
+rl_z = u38 + d_sin*k22_turned + ed*rle_z - d_cos*u37
+u39 = e*k24_turned
+ri_xx_slope = u39 + f_mean*k25_turned - k26_turned
+l45 = constants[299]
+ri_xx = l45 + e*ri_xx_slope + ff_mean*k28_turned - f_mean*k27_turned
+ri_xx_by_e = ri_xx_slope + u39
+ri_xy_slope = (-f_cos*k30_turned) - f_sin*k31_turned
+ri_xy = e*ri_xy_slope + f_sin*k32_turned - f_cos*k23_turned - ff_cos*k33_turned - ff_sin*k34_turned
+ri_xz_slope = f_cos*k31_turned - f_sin*k30_turned
+ri_xz = e*ri_xz_slope + ff_cos*k34_turned - f_cos*k32_turned - f_sin*k23_turned - ff_sin*k33_turned
+ri_yz_slope = f_cos*k35_turned + f_sin*k36_turned
+ri_yz = e*ri_yz_slope + f_sin*k38_turned + ff_cos*k39_turned + ff_sin*k40_turned - f_cos*k37_turned
+u40 = e*k41_turned
+ri_mean_slope = k43_turned + u40 + f_mean*k42_turned
+l85 = constants[339]
+ri_mean = l85 + e*ri_mean_slope + f_mean*k44_turned + ff_mean*k45_turned
+ri_mean_by_e = ri_mean_slope + u40
+ri_difference_slope = f_sin*k35_turned - f_cos*k36_turned
+ri_difference = e*ri_difference_slope + ff_sin*k39_turned - f_cos*k38_turned - f_sin*k37_turned - ff_cos*k40_turned
+ri_yy = ri_difference + ri_mean
+ri_zz = ri_mean - ri_difference
 h_ixx = constants[44]
-rotor_moment_x = blade1_netm_x*cos_cone + blade1_netm_z*sin_cone + blade2_netm_x*cos_cone + blade2_netm_z*sin_cone + blade3_netm_x*cos_cone + blade3_netm_z*sin_cone - h_ixx*hub_fullspin_x
+rih_xx = h_ixx + ri_xx
 h_itt = constants[45]
-rotor_moment_y = blade1_netm_y + h_itt*wf_x*won_z + half_sqrt3*(blade3_netm_z*cos_cone - blade3_netm_x*sin_cone) - (0.5)*blade2_netm_y - (0.5)*blade3_netm_y - h_itt*hub_fullspin_y - h_ixx*wf_x*won_z - half_sqrt3*(blade2_netm_z*cos_cone - blade2_netm_x*sin_cone)
-rotor_moment_z = blade1_netm_z*cos_cone + (0.5)*blade2_netm_x*sin_cone + blade2_netm_y*half_sqrt3 + (0.5)*blade3_netm_x*sin_cone + h_ixx*wf_x*won_y - blade1_netm_x*sin_cone - (0.5)*blade2_netm_z*cos_cone - blade3_netm_y*half_sqrt3 - (0.5)*blade3_netm_z*cos_cone - h_itt*hub_fullspin_z - h_itt*wf_x*won_y
-u152 = cos_phi*rotor_force_z + rotor_force_y*sin_phi
-rf_n_x = cos_tilt*rotor_force_x - sin_tilt*u152
-rf_n_y = cos_phi*rotor_force_y - rotor_force_z*sin_phi
-rf_n_z = cos_tilt*u152 + rotor_force_x*sin_tilt
-u153 = cos_phi*rotor_moment_z + rotor_moment_y*sin_phi
-rm_n_x = cos_tilt*rotor_moment_x - sin_tilt*u153
-rm_n_y = cos_phi*rotor_moment_y - rotor_moment_z*sin_phi
-rm_n_z = cos_tilt*u153 + rotor_moment_x*sin_tilt
+rih_yy = h_itt + ri_yy
+rih_zz = h_itt + ri_zz
+rid_xx = ed*ri_xx_by_e + fd_mean*k28_turned + k25_turned*u32 - d_mean*k27_turned
+rid_xy = d_sin*k32_turned + e*((-d_cos*k30_turned) - d_sin*k31_turned) + ed*ri_xy_slope - u38 - fd_cos*k33_turned - fd_sin*k34_turned
+rid_xz = e*(d_cos*k31_turned - d_sin*k30_turned) + ed*ri_xz_slope + fd_cos*k34_turned - u36 - d_cos*k32_turned - fd_sin*k33_turned
+rid_yz = d_sin*k38_turned + e*(d_cos*k35_turned + d_sin*k36_turned) + ed*ri_yz_slope + fd_cos*k39_turned + fd_sin*k40_turned - d_cos*k37_turned
+rid_mean = d_mean*k44_turned + ed*ri_mean_by_e + fd_mean*k45_turned + k42_turned*u32
+rid_difference = e*(d_sin*k35_turned - d_cos*k36_turned) + ed*ri_difference_slope + fd_sin*k39_turned - d_cos*k38_turned - d_sin*k37_turned - fd_cos*k40_turned
+rid_yy = rid_difference + rid_mean
+rid_zz = rid_mean - rid_difference
+turning_x = rid_xx*wf_x + rid_xy*won_y + rid_xz*won_z
+turning_y = rid_xy*wf_x + rid_yy*won_y + rid_yz*won_z
+turning_z = rid_xz*wf_x + rid_yz*won_y + rid_zz*won_z
+rot_whirl_x = rs_z*won_y + 2.0*rsd_x - rs_y*won_z
+rot_whirl_y = rs_x*won_z + 2.0*rsd_y - rs_z*wf_x
+rot_whirl_z = rs_y*wf_x + 2.0*rsd_z - rs_x*won_y
+rot_momentum_x = rl_x + ri_xy*won_y + ri_xz*won_z + rih_xx*wf_x
+rot_momentum_y = rl_y + ri_xy*wf_x + ri_yz*won_z + rih_yy*won_y
+rot_momentum_z = rl_z + ri_xz*wf_x + ri_yz*won_y + rih_zz*won_z
+l86 = constants[340]
+rot_force_x = rsdd_x + acc_f_s_x*l86 + rot_whirl_z*won_y + rs_z*spin_h_y - rot_whirl_y*won_z - rs_y*spin_h_z
+rot_force_y = rsdd_y + acc_f_y*l86 + rot_whirl_x*won_z + rs_x*spin_h_z - rot_whirl_z*wf_x - rs_z*spin_f_s_x
+rot_force_z = rsdd_z + acc_f_z*l86 + rot_whirl_y*wf_x + rs_y*spin_f_s_x - rot_whirl_x*won_y - rs_x*spin_h_y
+rot_moment_x = turning_x + acc_f_z*rs_y + ri_xy*spin_h_y + ri_xz*spin_h_z + rih_xx*spin_f_s_x + rot_momentum_z*won_y - acc_f_y*rs_z - rot_momentum_y*won_z
+rot_moment_y = turning_y + acc_f_s_x*rs_z + ri_xy*spin_f_s_x + ri_yz*spin_h_z + rih_yy*spin_h_y + rot_momentum_x*won_z - acc_f_z*rs_x - rot_momentum_z*wf_x
+rot_moment_z = turning_z + acc_f_y*rs_x + ri_xz*spin_f_s_x + ri_yz*spin_h_y + rih_zz*spin_h_z + rot_momentum_y*wf_x - acc_f_s_x*rs_y - rot_momentum_x*won_y
+w_xx = (wf_x*wf_x)
+u41 = wf_x*won_y
+w_xy = u41
+u42 = wf_x*won_z
+w_xz = u42
+w_yz = won_y*won_z
+w_yy = (won_y*won_y)
+w_zz = (won_z*won_z)
+u43 = (0.5)*w_yy
+u44 = (0.5)*w_zz
+w_mean = u43 + u44
+w_diff = u43 - u44
+l87 = constants[341]
+l88 = constants[342]
+h_edge = acc_f_s_x*rs_x_by_e + acc_f_y*rs_y_slope + acc_f_z*rs_z_slope + d_cos*l87*won_z + d_mean*l88*wf_x + rle_x*spin_f_s_x + rle_y*spin_h_y + rle_z*spin_h_z - d_sin*l87*won_y - ri_difference_slope*w_diff - ri_mean_by_e*w_mean - (0.5)*ri_xx_by_e*w_xx - ri_xy_slope*w_xy - ri_xz_slope*w_xz - ri_yz_slope*w_yz
 n_y = constants[50]
 n_z = constants[51]
-nacl_ta_x = ta_x + n_z*wa_y - n_y*wa_z
+u45 = ta_x + n_z*wa_y - n_y*wa_z
+nac_ta_x = u45
 n_x = constants[49]
-nacl_ta_y = ta_y + n_x*wa_z
-nacl_ta_z = (-u11) - n_x*wa_y
-nacl_ts_y = ts_y + n_z*t_slope_ss
-nacl_ts_z = ts_z - n_y*t_slope_ss
-u154 = n_y*wn_x - n_x*wn_y
-u155 = n_x*wn_z - n_z*wn_x
-nacl_acc_x = top_x + n_z*spin_n_y + u154*wn_y - n_y*spin_n_z - u155*wn_z
-u156 = n_z*wn_y - n_y*wn_z
-nacl_acc_y = top_y + n_x*spin_n_z + u156*wn_z - u154*wn_x
-nacl_acc_z = u155*wn_x - u16 - n_x*spin_n_y - u156*wn_y
-nacl_full_x = nacl_acc_x + add*nacl_ta_x + sdd*ts_x
-nacl_full_y = nacl_acc_y + add*nacl_ta_y + nacl_ts_y*sdd
-nacl_full_z = nacl_acc_z + add*nacl_ta_z + nacl_ts_z*sdd
-nacl_fullspin_x = -sdd*t_slope_ss
-nacl_fullspin_y = spin_n_y + add*wa_y
-nacl_fullspin_z = spin_n_z + add*wa_z
-n_m = constants[48]
-nac_force_x = -n_m*nacl_full_x
-nac_force_y = -n_m*nacl_full_y
-nac_force_z = -n_m*nacl_full_z
-top_force_x = nac_force_x + rf_n_x
-top_force_y = nac_force_y + rf_n_y
-top_force_z = nac_force_z + rf_n_z
-g_i = constants[55]
-gendd = derivative[15]
-u157 = g_i*gendd
-n_ixx = constants[52]
+u46 = ta_y + n_x*wa_z
+nac_ta_y = u46
+u47 = (-u11) - n_x*wa_y
+nac_ta_z = u47
+u48 = ts_y + n_z*t_slope_ss
+nac_ts_y = u48
+u49 = ts_z - n_y*t_slope_ss
+nac_ts_z = u49
+u50 = n_y*wn_x - n_x*wn_y
+u51 = n_x*wn_z - n_z*wn_x
+u52 = top_x + n_z*spin_n_y + u50*wn_y - n_y*spin_n_z - u51*wn_z
+nac_acc_x = u52
+u53 = n_z*wn_y - n_y*wn_z
+u54 = top_y + n_x*spin_n_z + u53*wn_z - u50*wn_x
+nac_acc_y = u54
+u55 = u51*wn_x - u16 - n_x*spin_n_y - u53*wn_y
+nac_acc_z = u55
 n_iyy = constants[53]
+u56 = n_iyy*u15
 n_izz = constants[54]
-top_moment_x = rm_n_x + n_iyy*wn_y*wn_z + n_y*nac_force_z - cos_tilt*u157 - l1*rf_n_y - n_ixx*nacl_fullspin_x - n_izz*u15 - n_z*nac_force_y
-top_moment_y = rm_n_y + l1*rf_n_x + n_izz*wn_x*wn_z + n_z*nac_force_x - l0*rf_n_z - n_ixx*wn_x*wn_z - n_iyy*nacl_fullspin_y - n_x*nac_force_z
-top_moment_z = rm_n_z + l0*rf_n_y + n_ixx*wn_x*wn_y + n_x*nac_force_y - n_iyy*u14 - n_izz*nacl_fullspin_z - n_y*nac_force_x - sin_tilt*u157
-u158 = roll_cos*top_force_z + roll_sin*top_force_y
-base_force_x = pitch_cos*top_force_x + pitch_sin*u158
-base_force_y = roll_cos*top_force_y - roll_sin*top_force_z
-base_force_z = pitch_cos*u158 - pitch_sin*top_force_x
+u57 = n_izz*u15
+nac_moment_x = u57 - u56
+u58 = wn_x*wn_z
+n_ixx = constants[52]
+u59 = n_ixx*u58 - n_izz*u58
+nac_moment_y = u59 + n_iyy*spin_n_y
+u60 = n_iyy*u14 - n_ixx*u14
+nac_moment_z = u60 + n_izz*spin_n_z
+l91 = constants[345]
+pressure_x = l91*pressure
+pressure_yz = (1.5)*pressure
+pressure_rx = pressure_x*radius
+pressure_ryz = pressure_yz*radius
+u61 = c_thrust*relative_x + c_thrust_edge*ed
+aero_force_x = pressure_x*(u61 + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
+u62 = c_tangential_kappa*kappa_cos + c_tangential_skew*skew_cos + c_tangential_y*relative_y
+sin_cone = constants[40]
+aero_force_y = pressure_yz*(sin_cone*(c_thrust_flap*d_sin + c_thrust_kappa*kappa_sin + c_thrust_skew*skew_sin + c_thrust_w*uniform_sin + c_thrust_y*relative_z) - u62 - c_tangential_flap*d_cos - c_tangential_w*uniform_cos)
+u63 = c_thrust_kappa*kappa_cos + c_thrust_skew*skew_cos + c_thrust_y*relative_y
+aero_force_z = pressure_yz*((-c_tangential_flap*d_sin) - c_tangential_kappa*kappa_sin - c_tangential_skew*skew_sin - c_tangential_w*uniform_sin - c_tangential_y*relative_z - sin_cone*(u63 + c_thrust_flap*d_cos + c_thrust_w*uniform_cos))
+u64 = c_torque*relative_x + c_torque_edge*ed
+aero_moment_x = pressure_rx*(u64 + c_torque_flap*d_mean + c_torque_w*uniform_mean)
+u65 = c_bending_kappa*kappa_cos + c_bending_skew*skew_cos + c_bending_y*relative_y
+aero_moment_y = pressure_ryz*(u65 + c_bending_flap*d_cos + c_bending_w*uniform_cos + sin_cone*(c_torque_flap*d_sin + c_torque_kappa*kappa_sin + c_torque_skew*skew_sin + c_torque_w*uniform_sin + c_torque_y*relative_z))
+u66 = c_torque_kappa*kappa_cos + c_torque_skew*skew_cos + c_torque_y*relative_y
+aero_moment_z = pressure_ryz*(c_bending_flap*d_sin + c_bending_kappa*kappa_sin + c_bending_skew*skew_sin + c_bending_w*uniform_sin + c_bending_y*relative_z - sin_cone*(u66 + c_torque_flap*d_cos + c_torque_w*uniform_cos))
+net_force_x = aero_force_x - rot_force_x
+net_force_y = aero_force_y - rot_force_y
+net_force_z = aero_force_z - rot_force_z
+net_moment_x = aero_moment_x - rot_moment_x
+net_moment_y = aero_moment_y - rot_moment_y
+net_moment_z = aero_moment_z - rot_moment_z
 gend = x[15]
 tg_k = constants[81]
 torque_optimal = (gend*gend)*tg_k
@@ -1785,19 +2097,501 @@ tg_a2 = constants[82]
 tg_t2 = constants[84]
 tg_ws = constants[83]
 torque_rise = tg_t2 + tg_a2*(gend - tg_ws) - torque_optimal
-l3 = constants[257]
-torque_below = torque_optimal + (0.5)*torque_rise + (0.5)*sqrt(l3 + (torque_rise*torque_rise))
-u159 = -torque_below
+l92 = constants[346]
+torque_below = torque_optimal + (0.5)*torque_rise + (0.5)*sqrt(l92 + (torque_rise*torque_rise))
+u67 = -torque_below
 tg_p = constants[85]
 tg_t = constants[86]
-torque_excess = (-tg_t) - u159 - tg_p/(gend + 1e-100)
-torque_gen = (-u159) - (0.5)*torque_excess - (0.5)*sqrt(l3 + (torque_excess*torque_excess))
+torque_excess = (-tg_t) - u67 - tg_p/(gend + 1e-100)
+torque_gen = (-u67) - (0.5)*torque_excess - (0.5)*sqrt(l92 + (torque_excess*torque_excess))
 d_d = constants[60]
 d_k = constants[59]
 gen = x[7]
-l4 = constants[258]
-l5 = constants[259]
-torque_shaft = d_d*(phid - gend*l4) + d_k*(phi - gen*l4) + l5*torque_gen
+l93 = constants[347]
+l94 = constants[348]
+torque_shaft = d_d*(phid - gend*l93) + d_k*(phi - gen*l93) + l94*torque_gen
+mom_a_x = l86*tha_s_x + rs_z*wha_y - rs_y*wha_z
+mom_a_y = l86*tha_y + rs_x*wha_z - rs_z*wha_s_x
+mom_a_z = l86*tha_z + rs_y*wha_s_x - rs_x*wha_y
+ang_a_x = ri_xy*wha_y + ri_xz*wha_z + rih_xx*wha_s_x + rs_y*tha_z - rs_z*tha_y
+ang_a_y = ri_xy*wha_s_x + ri_yz*wha_z + rih_yy*wha_y + rs_z*tha_s_x - rs_x*tha_z
+ang_a_z = ri_xz*wha_s_x + ri_yz*wha_y + rih_zz*wha_z + rs_x*tha_y - rs_y*tha_s_x
+mom_s_x = l86*ths_s_x + rs_z*whs_y - rs_y*whs_z
+mom_s_y = l86*ths_y + rs_x*whs_z - rs_z*whs_s_x
+mom_s_z = l86*ths_z + rs_y*whs_s_x - rs_x*whs_y
+ang_s_x = ri_xy*whs_y + ri_xz*whs_z + rih_xx*whs_s_x + rs_y*ths_z - rs_z*ths_y
+ang_s_y = ri_xy*whs_s_x + ri_yz*whs_z + rih_yy*whs_y + rs_z*ths_s_x - rs_x*ths_z
+ang_s_z = ri_xz*whs_s_x + ri_yz*whs_y + rih_zz*whs_z + rs_x*ths_y - rs_y*ths_s_x
+l99 = constants[353]
+c62 = e*l99 - k61_turned
+l102 = constants[356]
+c65 = k63_turned + e*l102
+l105 = constants[359]
+c68 = k65_turned + e*l105
+l108 = constants[362]
+c71 = e*l108 - k67_turned
+w_ed_x = ed*wf_x
+w_ed_y = ed*won_y
+w_ed_z = ed*won_z
+c76 = e*k70_turned - k71_turned
+c78 = k71_turned + e*k72_turned
+c81 = k67_turned + e*k74_turned
+c84 = e*k75_turned - k76_turned
+c86 = e*k77_turned - k63_turned
+c88 = k71_turned + e*k78_turned
+b_kfe = constants[29]
+l121 = constants[375]
+q_f_fixed_mean = acc_f_s_x*c62 + c65*spin_f_s_x + c76*w_xx + c78*w_mean + l121*w_ed_x + pressure*(c_flap*relative_x + c_flap_edge*ed + c_flap_w*uniform_mean) - b_kfe*e
+l134 = constants[388]
+q_f_fixed_cos = acc_f_z*c68 + c71*spin_h_z + c84*w_xz + c86*w_yz + l134*w_ed_z + pressure*(c_flap_kappa*kappa_cos + c_flap_skew*skew_cos + c_flap_w*uniform_cos + c_flap_y*relative_y) - acc_f_y*b_fy_turned - b_rfx_turned*spin_h_y - c81*w_xy - c88*w_diff
+q_f_fixed_sin = c86*w_diff + c88*w_yz + pressure*(c_flap_kappa*kappa_sin + c_flap_skew*skew_sin + c_flap_w*uniform_sin + c_flap_y*relative_z) - acc_f_y*c68 - acc_f_z*b_fy_turned - b_rfx_turned*spin_h_z - c71*spin_h_y - c81*w_xz - c84*w_xy - l134*w_ed_y
+q_f_fixed_other = q_f_fixed_mean - (0.5)*q_f_fixed_cos
+q_f_fixed_1 = q_f_fixed_cos + q_f_fixed_mean
+u68 = half_sqrt3*q_f_fixed_sin
+q_f_fixed_2 = q_f_fixed_other + u68
+q_f_fixed_3 = q_f_fixed_other - u68
+b_kf = constants[27]
+l111 = constants[365]
+q_f_by_flap_mean = acc_f_s_x*l111 + k80_turned*w_xx + k81_turned*w_mean - b_kf
+l112 = constants[366]
+q_f_by_flap_cos = acc_f_z*l112 + k83_turned*w_xz + k84_turned*w_yz - k82_turned*w_xy - k85_turned*w_diff
+q_f_by_flap_sin = k84_turned*w_diff + k85_turned*w_yz - acc_f_y*l112 - k82_turned*w_xz - k83_turned*w_xy
+q_f_by_flap_other = q_f_by_flap_mean - (0.5)*q_f_by_flap_cos
+q_f_by_flap_1 = q_f_by_flap_cos + q_f_by_flap_mean
+u69 = half_sqrt3*q_f_by_flap_sin
+q_f_by_flap_2 = q_f_by_flap_other + u69
+q_f_by_flap_3 = q_f_by_flap_other - u69
+b_df = constants[30]
+flap_damping = c_flap_flap*pressure - b_df
+q_f1 = q_f_fixed_1 + f1*q_f_by_flap_1 + f1d*flap_damping
+q_f2 = q_f_fixed_2 + f2*q_f_by_flap_2 + f2d*flap_damping
+q_f3 = q_f_fixed_3 + f3*q_f_by_flap_3 + f3d*flap_damping
+m_f_a_fixed_mean = (-c62*tha_s_x) - c65*wha_s_x
+m_f_a_fixed_cos = b_fy_turned*tha_y + b_rfx_turned*wha_y - c68*tha_z - c71*wha_z
+m_f_a_fixed_sin = b_fy_turned*tha_z + b_rfx_turned*wha_z + c68*tha_y + c71*wha_y
+m_f_a_fixed_other = m_f_a_fixed_mean - (0.5)*m_f_a_fixed_cos
+m_f_a_fixed_1 = m_f_a_fixed_cos + m_f_a_fixed_mean
+u70 = half_sqrt3*m_f_a_fixed_sin
+m_f_a_fixed_2 = m_f_a_fixed_other + u70
+m_f_a_fixed_3 = m_f_a_fixed_other - u70
+m_f_a_by_flap_mean = -l111*tha_s_x
+m_f_a_by_flap_cos = -l112*tha_z
+m_f_a_by_flap_sin = l112*tha_y
+m_f_a_by_flap_other = m_f_a_by_flap_mean - (0.5)*m_f_a_by_flap_cos
+m_f_a_by_flap_1 = m_f_a_by_flap_cos + m_f_a_by_flap_mean
+u71 = half_sqrt3*m_f_a_by_flap_sin
+m_f_a_by_flap_2 = m_f_a_by_flap_other + u71
+m_f_a_by_flap_3 = m_f_a_by_flap_other - u71
+m_f1a = m_f_a_fixed_1 + f1*m_f_a_by_flap_1
+m_f2a = m_f_a_fixed_2 + f2*m_f_a_by_flap_2
+m_f3a = m_f_a_fixed_3 + f3*m_f_a_by_flap_3
+m_f_s_fixed_mean = (-c62*ths_s_x) - c65*whs_s_x
+m_f_s_fixed_cos = b_fy_turned*ths_y + b_rfx_turned*whs_y - c68*ths_z - c71*whs_z
+m_f_s_fixed_sin = b_fy_turned*ths_z + b_rfx_turned*whs_z + c68*ths_y + c71*whs_y
+m_f_s_fixed_other = m_f_s_fixed_mean - (0.5)*m_f_s_fixed_cos
+m_f_s_fixed_1 = m_f_s_fixed_cos + m_f_s_fixed_mean
+u72 = half_sqrt3*m_f_s_fixed_sin
+m_f_s_fixed_2 = m_f_s_fixed_other + u72
+m_f_s_fixed_3 = m_f_s_fixed_other - u72
+m_f_s_by_flap_mean = -l111*ths_s_x
+m_f_s_by_flap_cos = -l112*ths_z
+m_f_s_by_flap_sin = l112*ths_y
+m_f_s_by_flap_other = m_f_s_by_flap_mean - (0.5)*m_f_s_by_flap_cos
+m_f_s_by_flap_1 = m_f_s_by_flap_cos + m_f_s_by_flap_mean
+u73 = half_sqrt3*m_f_s_by_flap_sin
+m_f_s_by_flap_2 = m_f_s_by_flap_other + u73
+m_f_s_by_flap_3 = m_f_s_by_flap_other - u73
+m_f1s = m_f_s_fixed_1 + f1*m_f_s_by_flap_1
+m_f2s = m_f_s_fixed_2 + f2*m_f_s_by_flap_2
+m_f3s = m_f_s_fixed_3 + f3*m_f_s_by_flap_3
+m_f_p_fixed_mean = -c65
+sum_a = m_f1a + m_f2a + m_f3a
+sum_s = m_f1s + m_f2s + m_f3s
+sum_q = q_f1 + q_f2 + q_f3
+l151 = constants[405]
+y_p = l151*m_f_p_fixed_mean
+b_de = constants[31]
+b_ke = constants[28]
+l152 = constants[406]
+r_e = 3.0*pressure*(c_edge*relative_x + c_edge_edge*ed + c_edge_flap*d_mean + c_edge_w*uniform_mean) - h_edge - 3.0*b_de*ed - 3.0*b_ke*e - 3.0*b_kfe*f_mean - l152*sum_q
+r_p = net_moment_x - torque_shaft - sum_q*y_p
+u74 = 3.0*y_p
+l97 = constants[351]
+s_pe = rle_x - l97*u74
+l154 = constants[408]
+l_pe = -l154*s_pe
+l95 = constants[349]
+s_pp = l95 + rih_xx - m_f_p_fixed_mean*u74
+inv_p = (1.0/(s_pp - l_pe*s_pe))
+z_p = r_p - l_pe*r_e
+l89 = constants[343]
+n_m = constants[48]
+t_da = constants[76]
+r_a = a*l89 + net_force_x*tha_s_x + net_force_y*tha_y + net_force_z*tha_z + net_moment_x*wha_s_x + net_moment_y*wha_y + net_moment_z*wha_z - ad*t_da - l151*(m_f1a*q_f1 + m_f2a*q_f2 + m_f3a*q_f3) - n_m*(nac_acc_x*nac_ta_x + nac_acc_y*nac_ta_y + nac_acc_z*nac_ta_z) - nac_moment_y*wa_y - nac_moment_z*wa_z
+s_ae = rle_x*wha_s_x + rle_y*wha_y + rle_z*wha_z + rs_x_by_e*tha_s_x + rs_y_slope*tha_y + rs_z_slope*tha_z - l152*sum_a
+l_ae = -l154*s_ae
+s_ap = ang_a_x - sum_a*y_p
+v_ap = s_ap - l_ae*s_pe
+l_ap = inv_p*v_ap
+t_maa = constants[62]
+s_aa = t_maa + ang_a_x*wha_s_x + ang_a_y*wha_y + ang_a_z*wha_z + mom_a_x*tha_s_x + mom_a_y*tha_y + mom_a_z*tha_z + n_iyy*(wa_y*wa_y) + n_izz*(wa_z*wa_z) + n_m*((nac_ta_x*nac_ta_x) + (nac_ta_y*nac_ta_y) + (nac_ta_z*nac_ta_z)) - l151*((m_f1a*m_f1a) + (m_f2a*m_f2a) + (m_f3a*m_f3a))
+inv_a = (1.0/(s_aa - l_ae*s_ae - l_ap*v_ap))
+z_a = r_a - l_ae*r_e - l_ap*z_p
+l90 = constants[344]
+t_ds = constants[77]
+r_s = l90*s + nac_moment_x*t_slope_ss + net_force_x*ths_s_x + net_force_y*ths_y + net_force_z*ths_z + net_moment_x*whs_s_x + net_moment_y*whs_y + net_moment_z*whs_z - l151*(m_f1s*q_f1 + m_f2s*q_f2 + m_f3s*q_f3) - n_m*(nac_acc_x*ts_x + nac_acc_y*nac_ts_y + nac_acc_z*nac_ts_z) - sd*t_ds
+s_se = rle_x*whs_s_x + rle_y*whs_y + rle_z*whs_z + rs_x_by_e*ths_s_x + rs_y_slope*ths_y + rs_z_slope*ths_z - l152*sum_s
+l_se = -l154*s_se
+s_sp = ang_s_x - sum_s*y_p
+v_sp = s_sp - l_se*s_pe
+l_sp = inv_p*v_sp
+s_sa = ang_s_x*wha_s_x + ang_s_y*wha_y + ang_s_z*wha_z + mom_s_x*tha_s_x + mom_s_y*tha_y + mom_s_z*tha_z + n_m*(nac_ta_x*ts_x + nac_ta_y*nac_ts_y + nac_ta_z*nac_ts_z) - l151*(m_f1a*m_f1s + m_f2a*m_f2s + m_f3a*m_f3s)
+v_sa = s_sa - l_se*s_ae - l_sp*v_ap
+l_sa = inv_a*v_sa
+t_mss = constants[63]
+s_ss = t_mss + ang_s_x*whs_s_x + ang_s_y*whs_y + ang_s_z*whs_z + mom_s_x*ths_s_x + mom_s_y*ths_y + mom_s_z*ths_z + n_ixx*(t_slope_ss*t_slope_ss) + n_m*((nac_ts_y*nac_ts_y) + (nac_ts_z*nac_ts_z) + (ts_x*ts_x)) - l151*((m_f1s*m_f1s) + (m_f2s*m_f2s) + (m_f3s*m_f3s))
+inv_s = (1.0/(s_ss - l_sa*v_sa - l_se*s_se - l_sp*v_sp))
+z_s = r_s - l_sa*z_a - l_se*r_e - l_sp*z_p
+x_s = inv_s*z_s
+x_a = inv_a*z_a - l_sa*x_s
+x_p = inv_p*z_p - l_ap*x_a - l_sp*x_s
+x_e = (-l154*r_e) - l_ae*x_a - l_pe*x_p - l_se*x_s
+x_common = l97*x_e + m_f_p_fixed_mean*x_p
+x_f1 = l151*(q_f1 - x_common - m_f1a*x_a - m_f1s*x_s)
+x_f2 = l151*(q_f2 - x_common - m_f2a*x_a - m_f2s*x_s)
+x_f3 = l151*(q_f3 - x_common - m_f3a*x_a - m_f3s*x_s)
+l155 = constants[409]
+l156 = constants[410]
+l157 = constants[411]
+x_gen = l156*(l155*torque_shaft - torque_gen) + l157*x_p
+add = x_a
+sdd = x_s
+f1dd = x_f1
+f2dd = x_f2
+f3dd = x_f3
+edd = x_e
+phidd = x_p
+gendd = x_gen
+hub_full_x = acc_f_s_x + add*tha_s_x + sdd*ths_s_x
+hub_full_y = acc_f_y + add*tha_y + sdd*ths_y
+hub_full_z = acc_f_z + add*tha_z + sdd*ths_z
+hub_fullspin_x = phidd + spin_f_s_x + add*wha_s_x + sdd*whs_s_x
+hub_fullspin_y = spin_h_y + add*wha_y + sdd*whs_y
+hub_fullspin_z = spin_h_z + add*wha_z + sdd*whs_z
+cos_cone = constants[39]
+u75 = cos_cone*wf_x
+lw_c1_x = u75 - sin_cone*won_z
+u76 = sin_cone*wf_x
+lw_c1_z = u76 + cos_cone*won_z
+u77 = cos_cone*hub_full_x
+lg_c1_x = u77 - hub_full_z*sin_cone
+u78 = hub_full_x*sin_cone
+lg_c1_z = u78 + cos_cone*hub_full_z
+u79 = cos_cone*hub_fullspin_x
+lsp_c1_x = u79 - hub_fullspin_z*sin_cone
+u80 = hub_fullspin_x*sin_cone
+lsp_c1_z = u80 + cos_cone*hub_fullspin_z
+u81 = b_ex_turned*e
+bs1_x = u81 + b_fx_turned*f1
+u82 = b_ey_turned*e
+bs1_y = u82 + b_fy_turned*f1
+b_sff = constants[21]
+u83 = (0.5)*b_sff
+b_sfe = constants[22]
+u84 = b_sfe*f1
+u85 = (e*e)
+b_m1 = constants[1]
+b_see = constants[23]
+u86 = (0.5)*b_see*u85 - b_m1
+bs1_z = (-u86) - e*u84 - u22*u83
+u87 = b_fyey_turned*u25
+u88 = b_fyfy_turned*u22 + e*u87
+u89 = b_eyey_turned*u85
+b_m2 = constants[2]
+b_rsee = constants[26]
+u90 = b_m2 - b_rsee*u85
+u91 = u89 + u90
+b_rsfe = constants[25]
+u92 = b_rsfe*u25
+b_rsff = constants[24]
+u93 = (-b_rsff*u22) - e*u92
+bi1_xx = u88 + u91 + u93
+u94 = b_exey_turned*u85
+u95 = b_fxey_turned + b_fyex_turned
+u96 = f1*u95
+bi1_xy = (-u94) - b_fxfy_turned*u22 - e*u96
+u97 = b_rex_turned*e
+bi1_xz = (-u97) - b_rfx_turned*f1
+u98 = b_fxex_turned*u25
+u99 = b_fxfx_turned*u22 + e*u98
+u100 = b_exex_turned*u85
+u101 = u100 + u90
+bi1_yy = u101 + u93 + u99
+u102 = b_rey_turned*e
+bi1_yz = (-u102) - b_rfy_turned*f1
+u103 = u100 + u89
+bi1_zz = u103 + u88 + u99
+u104 = 2.0*e
+u105 = -b_rsee*u104
+u106 = u105 - u92
+u107 = b_eyey_turned*u104
+u108 = u107 + u87
+u109 = -b_rsfe*u104
+u110 = u109 - b_rsff*u25
+u111 = b_fyey_turned*u104
+u112 = u111 + b_fyfy_turned*u25
+bid1_xx = ed*(u106 + u108) + f1d*(u110 + u112)
+u113 = b_exey_turned*u104
+u114 = e*u95
+bid1_xy = ed*((-u113) - u96) + f1d*((-u114) - b_fxfy_turned*u25)
+u115 = b_rex_turned*ed
+u116 = u115 + b_rfx_turned*f1d
+bid1_xz = -u116
+u117 = b_exex_turned*u104
+u118 = u117 + u98
+u119 = b_fxex_turned*u104
+u120 = u119 + b_fxfx_turned*u25
+bid1_yy = ed*(u106 + u118) + f1d*(u110 + u120)
+u121 = b_rey_turned*ed
+u122 = b_rfy_turned*f1d
+bid1_yz = (-u121) - u122
+bid1_zz = ed*(u108 + u118) + f1d*(u112 + u120)
+u123 = 2.0*ed
+u124 = b_ex_turned*u123
+u125 = 2.0*f1d
+blade1_whirl_x = u124 + b_fx_turned*u125 + bs1_z*won_y - bs1_y*lw_c1_z
+u126 = b_ey_turned*u123
+blade1_whirl_y = u126 + b_fy_turned*u125 + bs1_x*lw_c1_z - bs1_z*lw_c1_x
+u127 = b_see*e
+u128 = (-u127) - u84
+u129 = b_sfe*e
+u130 = (-u129) - b_sff*f1
+blade1_whirl_z = bs1_y*lw_c1_x + u123*u128 + u125*u130 - bs1_x*won_y
+u131 = -u121
+blade1_momentum_x = u131 + bi1_xx*lw_c1_x + bi1_xy*won_y + bi1_xz*lw_c1_z - u122
+blade1_momentum_y = u116 + bi1_xy*lw_c1_x + bi1_yy*won_y + bi1_yz*lw_c1_z
+u132 = b_fyex_turned - b_fxey_turned
+u133 = e*u132
+blade1_momentum_z = bi1_xz*lw_c1_x + bi1_yz*won_y + bi1_zz*lw_c1_z + f1d*u133 - ed*f1*u132
+b_m = constants[0]
+blade1_force_x = b_m*lg_c1_x + blade1_whirl_z*won_y + bs1_z*hub_fullspin_y - blade1_whirl_y*lw_c1_z - bs1_y*lsp_c1_z
+blade1_force_y = b_m*hub_full_y + blade1_whirl_x*lw_c1_z + bs1_x*lsp_c1_z - blade1_whirl_z*lw_c1_x - bs1_z*lsp_c1_x
+u134 = b_see*u34
+u135 = b_sfe*u123
+blade1_force_z = b_m*lg_c1_z + blade1_whirl_y*lw_c1_x + bs1_y*lsp_c1_x - u134 - b_sff*u28 - blade1_whirl_x*won_y - bs1_x*hub_fullspin_y - f1d*u135
+blade1_moment_x = bi1_xx*lsp_c1_x + bi1_xy*hub_fullspin_y + bi1_xz*lsp_c1_z + bid1_xx*lw_c1_x + bid1_xy*won_y + bid1_xz*lw_c1_z + blade1_momentum_z*won_y + bs1_y*lg_c1_z - blade1_momentum_y*lw_c1_z - bs1_z*hub_full_y
+blade1_moment_y = bi1_xy*lsp_c1_x + bi1_yy*hub_fullspin_y + bi1_yz*lsp_c1_z + bid1_xy*lw_c1_x + bid1_yy*won_y + bid1_yz*lw_c1_z + blade1_momentum_x*lw_c1_z + bs1_z*lg_c1_x - blade1_momentum_z*lw_c1_x - bs1_x*lg_c1_z
+blade1_moment_z = bi1_xz*lsp_c1_x + bi1_yz*hub_fullspin_y + bi1_zz*lsp_c1_z + bid1_xz*lw_c1_x + bid1_yz*won_y + bid1_zz*lw_c1_z + blade1_momentum_y*lw_c1_x + bs1_x*hub_full_y - blade1_momentum_x*won_y - bs1_y*lg_c1_x
+u136 = b_ex_turned*edd
+u137 = uniform_cos + uniform_mean
+blade1_net_x = pressure*(u61 + u63 + c_thrust_flap*f1d + c_thrust_w*u137) - blade1_force_x - u136 - b_fx_turned*f1dd
+u138 = b_ey_turned*edd
+u139 = c_tangential*relative_x + c_tangential_edge*ed
+blade1_net_y = pressure*((-u139) - u62 - c_tangential_flap*f1d - c_tangential_w*u137) - blade1_force_y - u138 - b_fy_turned*f1dd
+blade1_net_z = (-blade1_force_z) - edd*u128 - f1dd*u130
+u140 = b_rey_turned*edd
+u141 = pressure*radius
+blade1_netm_x = u140 + b_rfy_turned*f1dd + u141*(u64 + u66 + c_torque_flap*f1d + c_torque_w*u137) - blade1_moment_x
+u142 = b_rex_turned*edd
+u143 = c_bending*relative_x + c_bending_edge*ed
+blade1_netm_y = pressure*radius*(u143 + u65 + c_bending_flap*f1d + c_bending_w*u137) - blade1_moment_y - u142 - b_rfx_turned*f1dd
+blade1_netm_z = edd*f1*u132 - blade1_moment_z - f1dd*u133
+u144 = (0.5)*won_y
+u145 = half_sqrt3*won_z
+lw_2_y = u145 - u144
+u146 = (0.5)*won_z
+u147 = half_sqrt3*won_y
+lw_2_z = (-u146) - u147
+lw_c2_x = u75 - lw_2_z*sin_cone
+lw_c2_z = u76 + cos_cone*lw_2_z
+u148 = (0.5)*hub_full_y
+u149 = half_sqrt3*hub_full_z
+lg_2_y = u149 - u148
+u150 = (0.5)*hub_full_z
+u151 = half_sqrt3*hub_full_y
+lg_2_z = (-u150) - u151
+lg_c2_x = u77 - lg_2_z*sin_cone
+lg_c2_z = u78 + cos_cone*lg_2_z
+u152 = (0.5)*hub_fullspin_y
+u153 = half_sqrt3*hub_fullspin_z
+lsp_2_y = u153 - u152
+u154 = (0.5)*hub_fullspin_z
+u155 = half_sqrt3*hub_fullspin_y
+lsp_2_z = (-u154) - u155
+lsp_c2_x = u79 - lsp_2_z*sin_cone
+lsp_c2_z = u80 + cos_cone*lsp_2_z
+bs2_x = u81 + b_fx_turned*f2
+bs2_y = u82 + b_fy_turned*f2
+bs2_z = (-u86) - f2*u129 - u23*u83
+u156 = b_fyey_turned*u26
+u157 = b_fyfy_turned*u23 + e*u156
+u158 = b_rsfe*u26
+u159 = (-b_rsff*u23) - e*u158
+bi2_xx = u157 + u159 + u91
+bi2_xy = (-u94) - b_fxfy_turned*u23 - f2*u114
+bi2_xz = (-u97) - b_rfx_turned*f2
+u160 = b_fxex_turned*u26
+u161 = b_fxfx_turned*u23 + e*u160
+bi2_yy = u101 + u159 + u161
+bi2_yz = (-u102) - b_rfy_turned*f2
+bi2_zz = u103 + u157 + u161
+u162 = u105 - u158
+u163 = u107 + u156
+u164 = u109 - b_rsff*u26
+u165 = u111 + b_fyfy_turned*u26
+bid2_xx = ed*(u162 + u163) + f2d*(u164 + u165)
+bid2_xy = ed*((-u113) - f2*u95) + f2d*((-u114) - b_fxfy_turned*u26)
+u166 = u115 + b_rfx_turned*f2d
+bid2_xz = -u166
+u167 = u117 + u160
+u168 = u119 + b_fxfx_turned*u26
+bid2_yy = ed*(u162 + u167) + f2d*(u164 + u168)
+u169 = b_rfy_turned*f2d
+bid2_yz = (-u121) - u169
+bid2_zz = ed*(u163 + u167) + f2d*(u165 + u168)
+u170 = 2.0*f2d
+blade2_whirl_x = u124 + b_fx_turned*u170 + bs2_z*lw_2_y - bs2_y*lw_c2_z
+blade2_whirl_y = u126 + b_fy_turned*u170 + bs2_x*lw_c2_z - bs2_z*lw_c2_x
+u171 = (-u127) - b_sfe*f2
+u172 = (-u129) - b_sff*f2
+blade2_whirl_z = bs2_y*lw_c2_x + u123*u171 + u170*u172 - bs2_x*lw_2_y
+blade2_momentum_x = u131 + bi2_xx*lw_c2_x + bi2_xy*lw_2_y + bi2_xz*lw_c2_z - u169
+blade2_momentum_y = u166 + bi2_xy*lw_c2_x + bi2_yy*lw_2_y + bi2_yz*lw_c2_z
+blade2_momentum_z = bi2_xz*lw_c2_x + bi2_yz*lw_2_y + bi2_zz*lw_c2_z + f2d*u133 - ed*f2*u132
+blade2_force_x = b_m*lg_c2_x + blade2_whirl_z*lw_2_y + bs2_z*lsp_2_y - blade2_whirl_y*lw_c2_z - bs2_y*lsp_c2_z
+blade2_force_y = b_m*lg_2_y + blade2_whirl_x*lw_c2_z + bs2_x*lsp_c2_z - blade2_whirl_z*lw_c2_x - bs2_z*lsp_c2_x
+blade2_force_z = b_m*lg_c2_z + blade2_whirl_y*lw_c2_x + bs2_y*lsp_c2_x - u134 - b_sff*u29 - blade2_whirl_x*lw_2_y - bs2_x*lsp_2_y - f2d*u135
+blade2_moment_x = bi2_xx*lsp_c2_x + bi2_xy*lsp_2_y + bi2_xz*lsp_c2_z + bid2_xx*lw_c2_x + bid2_xy*lw_2_y + bid2_xz*lw_c2_z + blade2_momentum_z*lw_2_y + bs2_y*lg_c2_z - blade2_momentum_y*lw_c2_z - bs2_z*lg_2_y
+blade2_moment_y = bi2_xy*lsp_c2_x + bi2_yy*lsp_2_y + bi2_yz*lsp_c2_z + bid2_xy*lw_c2_x + bid2_yy*lw_2_y + bid2_yz*lw_c2_z + blade2_momentum_x*lw_c2_z + bs2_z*lg_c2_x - blade2_momentum_z*lw_c2_x - bs2_x*lg_c2_z
+blade2_moment_z = bi2_xz*lsp_c2_x + bi2_yz*lsp_2_y + bi2_zz*lsp_c2_z + bid2_xz*lw_c2_x + bid2_yz*lw_2_y + bid2_zz*lw_c2_z + blade2_momentum_y*lw_c2_x + bs2_x*lg_2_y - blade2_momentum_x*lw_2_y - bs2_y*lg_c2_x
+u173 = (0.5)*kappa_cos
+u174 = half_sqrt3*kappa_sin
+u175 = u174 - u173
+u176 = (0.5)*skew_cos
+u177 = half_sqrt3*skew_sin
+u178 = u177 - u176
+u179 = (0.5)*uniform_cos
+u180 = half_sqrt3*uniform_sin
+u181 = u180 + uniform_mean - u179
+u182 = (0.5)*relative_y
+u183 = half_sqrt3*relative_z
+u184 = u183 - u182
+blade2_net_x = pressure*(u61 + c_thrust_flap*f2d + c_thrust_kappa*u175 + c_thrust_skew*u178 + c_thrust_w*u181 + c_thrust_y*u184) - blade2_force_x - u136 - b_fx_turned*f2dd
+blade2_net_y = pressure*((-u139) - c_tangential_flap*f2d - c_tangential_kappa*u175 - c_tangential_skew*u178 - c_tangential_w*u181 - c_tangential_y*u184) - blade2_force_y - u138 - b_fy_turned*f2dd
+blade2_net_z = (-blade2_force_z) - edd*u171 - f2dd*u172
+blade2_netm_x = u140 + b_rfy_turned*f2dd + u141*(u64 + c_torque_flap*f2d + c_torque_kappa*u175 + c_torque_skew*u178 + c_torque_w*u181 + c_torque_y*u184) - blade2_moment_x
+blade2_netm_y = pressure*radius*(u143 + c_bending_flap*f2d + c_bending_kappa*u175 + c_bending_skew*u178 + c_bending_w*u181 + c_bending_y*u184) - blade2_moment_y - u142 - b_rfx_turned*f2dd
+blade2_netm_z = edd*f2*u132 - blade2_moment_z - f2dd*u133
+lw_3_y = (-u144) - u145
+lw_3_z = u147 - u146
+lw_c3_x = u75 - lw_3_z*sin_cone
+lw_c3_z = u76 + cos_cone*lw_3_z
+lg_3_y = (-u148) - u149
+lg_3_z = u151 - u150
+lg_c3_x = u77 - lg_3_z*sin_cone
+lg_c3_z = u78 + cos_cone*lg_3_z
+lsp_3_y = (-u152) - u153
+lsp_3_z = u155 - u154
+lsp_c3_x = u79 - lsp_3_z*sin_cone
+lsp_c3_z = u80 + cos_cone*lsp_3_z
+bs3_x = u81 + b_fx_turned*f3
+bs3_y = u82 + b_fy_turned*f3
+bs3_z = (-u86) - f3*u129 - u24*u83
+u185 = b_fyey_turned*u27
+u186 = b_fyfy_turned*u24 + e*u185
+u187 = b_rsfe*u27
+u188 = (-b_rsff*u24) - e*u187
+bi3_xx = u186 + u188 + u91
+bi3_xy = (-u94) - b_fxfy_turned*u24 - f3*u114
+bi3_xz = (-u97) - b_rfx_turned*f3
+u189 = b_fxex_turned*u27
+u190 = b_fxfx_turned*u24 + e*u189
+bi3_yy = u101 + u188 + u190
+bi3_yz = (-u102) - b_rfy_turned*f3
+bi3_zz = u103 + u186 + u190
+u191 = u105 - u187
+u192 = u107 + u185
+u193 = u109 - b_rsff*u27
+u194 = u111 + b_fyfy_turned*u27
+bid3_xx = ed*(u191 + u192) + f3d*(u193 + u194)
+bid3_xy = ed*((-u113) - f3*u95) + f3d*((-u114) - b_fxfy_turned*u27)
+u195 = u115 + b_rfx_turned*f3d
+bid3_xz = -u195
+u196 = u117 + u189
+u197 = u119 + b_fxfx_turned*u27
+bid3_yy = ed*(u191 + u196) + f3d*(u193 + u197)
+u198 = b_rfy_turned*f3d
+bid3_yz = (-u121) - u198
+bid3_zz = ed*(u192 + u196) + f3d*(u194 + u197)
+u199 = 2.0*f3d
+blade3_whirl_x = u124 + b_fx_turned*u199 + bs3_z*lw_3_y - bs3_y*lw_c3_z
+blade3_whirl_y = u126 + b_fy_turned*u199 + bs3_x*lw_c3_z - bs3_z*lw_c3_x
+u200 = (-u127) - b_sfe*f3
+u201 = (-u129) - b_sff*f3
+blade3_whirl_z = bs3_y*lw_c3_x + u123*u200 + u199*u201 - bs3_x*lw_3_y
+blade3_momentum_x = u131 + bi3_xx*lw_c3_x + bi3_xy*lw_3_y + bi3_xz*lw_c3_z - u198
+blade3_momentum_y = u195 + bi3_xy*lw_c3_x + bi3_yy*lw_3_y + bi3_yz*lw_c3_z
+blade3_momentum_z = bi3_xz*lw_c3_x + bi3_yz*lw_3_y + bi3_zz*lw_c3_z + f3d*u133 - ed*f3*u132
+blade3_force_x = b_m*lg_c3_x + blade3_whirl_z*lw_3_y + bs3_z*lsp_3_y - blade3_whirl_y*lw_c3_z - bs3_y*lsp_c3_z
+blade3_force_y = b_m*lg_3_y + blade3_whirl_x*lw_c3_z + bs3_x*lsp_c3_z - blade3_whirl_z*lw_c3_x - bs3_z*lsp_c3_x
+blade3_force_z = b_m*lg_c3_z + blade3_whirl_y*lw_c3_x + bs3_y*lsp_c3_x - u134 - b_sff*u30 - blade3_whirl_x*lw_3_y - bs3_x*lsp_3_y - f3d*u135
+blade3_moment_x = bi3_xx*lsp_c3_x + bi3_xy*lsp_3_y + bi3_xz*lsp_c3_z + bid3_xx*lw_c3_x + bid3_xy*lw_3_y + bid3_xz*lw_c3_z + blade3_momentum_z*lw_3_y + bs3_y*lg_c3_z - blade3_momentum_y*lw_c3_z - bs3_z*lg_3_y
+blade3_moment_y = bi3_xy*lsp_c3_x + bi3_yy*lsp_3_y + bi3_yz*lsp_c3_z + bid3_xy*lw_c3_x + bid3_yy*lw_3_y + bid3_yz*lw_c3_z + blade3_momentum_x*lw_c3_z + bs3_z*lg_c3_x - blade3_momentum_z*lw_c3_x - bs3_x*lg_c3_z
+blade3_moment_z = bi3_xz*lsp_c3_x + bi3_yz*lsp_3_y + bi3_zz*lsp_c3_z + bid3_xz*lw_c3_x + bid3_yz*lw_3_y + bid3_zz*lw_c3_z + blade3_momentum_y*lw_c3_x + bs3_x*lg_3_y - blade3_momentum_x*lw_3_y - bs3_y*lg_c3_x
+u202 = (-u173) - u174
+u203 = (-u176) - u177
+u204 = uniform_mean - u179 - u180
+u205 = (-u182) - u183
+blade3_net_x = pressure*(u61 + c_thrust_flap*f3d + c_thrust_kappa*u202 + c_thrust_skew*u203 + c_thrust_w*u204 + c_thrust_y*u205) - blade3_force_x - u136 - b_fx_turned*f3dd
+blade3_net_y = pressure*((-u139) - c_tangential_flap*f3d - c_tangential_kappa*u202 - c_tangential_skew*u203 - c_tangential_w*u204 - c_tangential_y*u205) - blade3_force_y - u138 - b_fy_turned*f3dd
+blade3_net_z = (-blade3_force_z) - edd*u200 - f3dd*u201
+blade3_netm_x = u140 + b_rfy_turned*f3dd + u141*(u64 + c_torque_flap*f3d + c_torque_kappa*u202 + c_torque_skew*u203 + c_torque_w*u204 + c_torque_y*u205) - blade3_moment_x
+blade3_netm_y = pressure*radius*(u143 + c_bending_flap*f3d + c_bending_kappa*u202 + c_bending_skew*u203 + c_bending_w*u204 + c_bending_y*u205) - blade3_moment_y - u142 - b_rfx_turned*f3dd
+blade3_netm_z = edd*f3*u132 - blade3_moment_z - f3dd*u133
+h_m = constants[43]
+rotor_force_x = blade1_net_x*cos_cone + blade1_net_z*sin_cone + blade2_net_x*cos_cone + blade2_net_z*sin_cone + blade3_net_x*cos_cone + blade3_net_z*sin_cone - h_m*hub_full_x
+rotor_force_y = blade1_net_y + half_sqrt3*(blade3_net_z*cos_cone - blade3_net_x*sin_cone) - (0.5)*blade2_net_y - (0.5)*blade3_net_y - h_m*hub_full_y - half_sqrt3*(blade2_net_z*cos_cone - blade2_net_x*sin_cone)
+rotor_force_z = blade1_net_z*cos_cone + (0.5)*blade2_net_x*sin_cone + blade2_net_y*half_sqrt3 + (0.5)*blade3_net_x*sin_cone - blade1_net_x*sin_cone - (0.5)*blade2_net_z*cos_cone - blade3_net_y*half_sqrt3 - (0.5)*blade3_net_z*cos_cone - h_m*hub_full_z
+rotor_moment_x = blade1_netm_x*cos_cone + blade1_netm_z*sin_cone + blade2_netm_x*cos_cone + blade2_netm_z*sin_cone + blade3_netm_x*cos_cone + blade3_netm_z*sin_cone - h_ixx*hub_fullspin_x
+rotor_moment_y = blade1_netm_y + h_itt*wf_x*won_z + half_sqrt3*(blade3_netm_z*cos_cone - blade3_netm_x*sin_cone) - (0.5)*blade2_netm_y - (0.5)*blade3_netm_y - h_itt*hub_fullspin_y - h_ixx*u42 - half_sqrt3*(blade2_netm_z*cos_cone - blade2_netm_x*sin_cone)
+rotor_moment_z = blade1_netm_z*cos_cone + (0.5)*blade2_netm_x*sin_cone + blade2_netm_y*half_sqrt3 + (0.5)*blade3_netm_x*sin_cone + h_ixx*wf_x*won_y - blade1_netm_x*sin_cone - (0.5)*blade2_netm_z*cos_cone - blade3_netm_y*half_sqrt3 - (0.5)*blade3_netm_z*cos_cone - h_itt*hub_fullspin_z - h_itt*u41
+u206 = cos_phi*rotor_force_z + rotor_force_y*sin_phi
+rf_n_x = cos_tilt*rotor_force_x - sin_tilt*u206
+rf_n_y = cos_phi*rotor_force_y - rotor_force_z*sin_phi
+rf_n_z = cos_tilt*u206 + rotor_force_x*sin_tilt
+u207 = cos_phi*rotor_moment_z + rotor_moment_y*sin_phi
+rm_n_x = cos_tilt*rotor_moment_x - sin_tilt*u207
+rm_n_y = cos_phi*rotor_moment_y - rotor_moment_z*sin_phi
+rm_n_z = cos_tilt*u207 + rotor_moment_x*sin_tilt
+nacl_ta_x = u45
+nacl_ta_y = u46
+nacl_ta_z = u47
+nacl_ts_y = u48
+nacl_ts_z = u49
+nacl_acc_x = u52
+nacl_acc_y = u54
+nacl_acc_z = u55
+nacl_full_x = nacl_acc_x + add*nacl_ta_x + sdd*ts_x
+nacl_full_y = nacl_acc_y + add*nacl_ta_y + nacl_ts_y*sdd
+nacl_full_z = nacl_acc_z + add*nacl_ta_z + nacl_ts_z*sdd
+nacl_fullspin_x = -sdd*t_slope_ss
+nacl_fullspin_y = spin_n_y + add*wa_y
+nacl_fullspin_z = spin_n_z + add*wa_z
+nac_force_x = -n_m*nacl_full_x
+nac_force_y = -n_m*nacl_full_y
+nac_force_z = -n_m*nacl_full_z
+top_force_x = nac_force_x + rf_n_x
+top_force_y = nac_force_y + rf_n_y
+top_force_z = nac_force_z + rf_n_z
+g_i = constants[55]
+u208 = g_i*gendd
+top_moment_x = rm_n_x + u56 + n_y*nac_force_z - u57 - cos_tilt*u208 - l1*rf_n_y - n_ixx*nacl_fullspin_x - n_z*nac_force_y
+top_moment_y = rm_n_y + l1*rf_n_x + n_z*nac_force_x - u59 - l0*rf_n_z - n_iyy*nacl_fullspin_y - n_x*nac_force_z
+top_moment_z = rm_n_z + l0*rf_n_y + n_x*nac_force_y - u60 - n_izz*nacl_fullspin_z - n_y*nac_force_x - sin_tilt*u208
+u209 = roll_cos*top_force_z + roll_sin*top_force_y
+base_force_x = pitch_cos*top_force_x + pitch_sin*u209
+base_force_y = roll_cos*top_force_y - roll_sin*top_force_z
+base_force_z = pitch_cos*u209 - pitch_sin*top_force_x
 t_fa = constants[64]
 t_h = constants[61]
 t_zfa = constants[66]
@@ -1812,10 +2606,8 @@ out[4] = theta_c*(blade3_netm_y - b_root*blade3_net_x) + theta_s*(blade3_netm_x 
 out[5] = theta_c*(blade1_netm_x + b_root*blade1_net_y) - theta_s*(blade1_netm_y - b_root*blade1_net_x)
 out[6] = theta_c*(blade2_netm_x + b_root*blade2_net_y) - theta_s*(blade2_netm_y - b_root*blade2_net_x)
 out[7] = theta_c*(blade3_netm_x + b_root*blade3_net_y) - theta_s*(blade3_netm_y - b_root*blade3_net_x)
-l6 = constants[260]
-out[8] = torque_shaft + l6*phidd
-l7 = constants[261]
-out[9] = l7*pressure*(c_thrust*relative_x + c_thrust_edge*ed + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
+out[8] = torque_shaft + l95*phidd
+out[9] = l91*pressure*(c_thrust*relative_x + c_thrust_edge*ed + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
 out[10] = torque_gen
 out[11] = b_tip_ex_turned*e + b_tip_fx_turned*f1
 out[12] = b_tip_ex_turned*e + b_tip_fx_turned*f2
@@ -1826,10 +2618,10 @@ out[16] = b_tip_ey_turned*e + b_tip_fy_turned*f3
 out[17] = add
 out[18] = sdd
 """)
-_loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'derivative', 'out'), LANES)
+_loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'out'), LANES)
 
 
 @njit(**INLINE)
-def loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped):
-    """Load channels of LANES states: x, derivative (16, LANES), wind (5, LANES), control (1, LANES), out (k, LANES)."""
-    _loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped)
+def loads(x, wind, control, out, start, tables, cells, constants, clamped):
+    """Load channels of LANES states: x (16, LANES), wind (5, LANES), control (1, LANES), out (k, LANES)."""
+    _loads(x, wind, control, out, start, tables, cells, constants, clamped)

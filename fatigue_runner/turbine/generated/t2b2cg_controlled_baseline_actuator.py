@@ -349,18 +349,221 @@ def constants(parameters):
     l0 = cos_tilt*overhang
     l1 = tower_to_shaft + overhang*sin_tilt
     l2 = (0.3333333333333333)*q_area
-    l3 = (1.0/g_ratio)
-    l4 = g_ratio*g_rigid/g_efficiency
-    l5 = g_i*(g_ratio*g_ratio)*g_rigid/g_efficiency
-    l6 = 3.0*cos_cone
-    l7 = (0.5)*b_fxfx - (0.5)*b_fyfy
-    l8 = (0.5)*b_fxfx + (0.5)*b_fyfy
-    l9 = (0.5)*b_exex - (0.5)*b_eyey
-    l10 = (0.5)*b_exex + (0.5)*b_eyey
-    l11 = (0.5)*b_fxex - (0.5)*b_fyey
-    l12 = (0.5)*b_fxey + (0.5)*b_fyex
-    l13 = (0.5)*b_fxex + (0.5)*b_fyey
-    l14 = (0.5)*b_fxey - (0.5)*b_fyex
+    l3 = 3.0*b_ex*cos_cone
+    l4 = 3.0*b_ey*cos_cone
+    l5 = (1.5)*b_see*sin_cone
+    l6 = 3.0*b_sfe*sin_cone
+    l7 = 3.0*b_fx*cos_cone
+    l8 = 3.0*b_fy*cos_cone
+    l9 = (1.5)*b_sff*sin_cone
+    l10 = 3.0*b_m1*sin_cone
+    l11 = (1.5)*b_ey
+    l12 = (1.5)*b_ex
+    l13 = (1.5)*b_ex*sin_cone
+    l14 = (1.5)*b_ey*sin_cone
+    l15 = (0.75)*b_see*cos_cone
+    l16 = (1.5)*b_sfe*cos_cone
+    l17 = (1.5)*b_fy
+    l18 = (1.5)*b_fx
+    l19 = (1.5)*b_fx*sin_cone
+    l20 = (1.5)*b_fy*sin_cone
+    l21 = (0.75)*b_sff*cos_cone
+    l22 = 3.0*b_sff*sin_cone
+    l23 = 6.0*b_sfe*sin_cone
+    l24 = 3.0*b_see*sin_cone
+    l25 = (1.5)*b_sff*cos_cone
+    l26 = 3.0*b_sfe*cos_cone
+    l27 = (1.5)*b_see*cos_cone
+    l28 = 3.0*b_rfy*cos_cone
+    l29 = 3.0*b_rfx*cos_cone
+    l30 = 3.0*b_rey*cos_cone
+    l31 = 3.0*b_rex*cos_cone
+    l32 = 3.0*b_fxey*sin_cone - 3.0*b_fyex*sin_cone
+    l33 = (1.5)*b_rfx
+    l34 = (1.5)*b_rfy
+    l35 = (1.5)*b_rfy*sin_cone
+    l36 = (1.5)*b_rfx*sin_cone
+    l37 = (1.5)*b_rex
+    l38 = (1.5)*b_rey
+    l39 = (1.5)*b_rey*sin_cone
+    l40 = (1.5)*b_rex*sin_cone
+    l41 = (1.5)*b_fxey*cos_cone - (1.5)*b_fyex*cos_cone
+    l42 = 6.0*b_rex*cos_cone*sin_cone
+    l43 = 6.0*b_rey*cos_cone*sin_cone
+    l44 = (1.5)*b_exex*(cos_cone*cos_cone) - (1.5)*b_eyey*(cos_cone*cos_cone)
+    l45 = 3.0*b_exey*(cos_cone*cos_cone)
+    l46 = (1.5)*b_exex*(cos_cone*cos_cone) + 3.0*b_exex*(sin_cone*sin_cone) + (1.5)*b_eyey*(cos_cone*cos_cone) + 3.0*b_eyey*(sin_cone*sin_cone) - 3.0*b_rsee*(cos_cone*cos_cone)
+    l47 = 3.0*b_fxex*(cos_cone*cos_cone) - 3.0*b_fyey*(cos_cone*cos_cone)
+    l48 = 3.0*b_fxey*(cos_cone*cos_cone) + 3.0*b_fyex*(cos_cone*cos_cone)
+    l49 = 3.0*b_fxex*(cos_cone*cos_cone) + 6.0*b_fxex*(sin_cone*sin_cone) + 3.0*b_fyey*(cos_cone*cos_cone) + 6.0*b_fyey*(sin_cone*sin_cone) - 6.0*b_rsfe*(cos_cone*cos_cone)
+    l50 = 6.0*b_rfx*cos_cone*sin_cone
+    l51 = 6.0*b_rfy*cos_cone*sin_cone
+    l52 = (1.5)*b_fxfx*(cos_cone*cos_cone) - (1.5)*b_fyfy*(cos_cone*cos_cone)
+    l53 = 3.0*b_fxfy*(cos_cone*cos_cone)
+    l54 = (1.5)*b_fxfx*(cos_cone*cos_cone) + 3.0*b_fxfx*(sin_cone*sin_cone) + (1.5)*b_fyfy*(cos_cone*cos_cone) + 3.0*b_fyfy*(sin_cone*sin_cone) - 3.0*b_rsff*(cos_cone*cos_cone)
+    l55 = 3.0*b_m2*(cos_cone*cos_cone)
+    l56 = (1.5)*b_rex*(cos_cone*cos_cone) - (1.5)*b_rex*(sin_cone*sin_cone)
+    l57 = (1.5)*b_rey*(cos_cone*cos_cone) - (1.5)*b_rey*(sin_cone*sin_cone)
+    l58 = (1.5)*b_exey*cos_cone
+    l59 = (0.75)*b_exex*cos_cone - (0.75)*b_eyey*cos_cone
+    l60 = (0.75)*b_exex*cos_cone*sin_cone - (0.75)*b_eyey*cos_cone*sin_cone
+    l61 = (1.5)*b_exey*cos_cone*sin_cone
+    l62 = (0.75)*b_exex*cos_cone*sin_cone + (0.75)*b_eyey*cos_cone*sin_cone + (1.5)*b_rsee*cos_cone*sin_cone
+    l63 = (1.5)*b_fxey*cos_cone + (1.5)*b_fyex*cos_cone
+    l64 = (1.5)*b_fxex*cos_cone - (1.5)*b_fyey*cos_cone
+    l65 = (1.5)*b_fxex*cos_cone*sin_cone - (1.5)*b_fyey*cos_cone*sin_cone
+    l66 = (1.5)*b_fxey*cos_cone*sin_cone + (1.5)*b_fyex*cos_cone*sin_cone
+    l67 = (1.5)*b_fxex*cos_cone*sin_cone + (1.5)*b_fyey*cos_cone*sin_cone + 3.0*b_rsfe*cos_cone*sin_cone
+    l68 = (1.5)*b_rfx*(cos_cone*cos_cone) - (1.5)*b_rfx*(sin_cone*sin_cone)
+    l69 = (1.5)*b_rfy*(cos_cone*cos_cone) - (1.5)*b_rfy*(sin_cone*sin_cone)
+    l70 = (1.5)*b_fxfy*cos_cone
+    l71 = (0.75)*b_fxfx*cos_cone - (0.75)*b_fyfy*cos_cone
+    l72 = (0.75)*b_fxfx*cos_cone*sin_cone - (0.75)*b_fyfy*cos_cone*sin_cone
+    l73 = (1.5)*b_fxfy*cos_cone*sin_cone
+    l74 = (0.75)*b_fxfx*cos_cone*sin_cone + (0.75)*b_fyfy*cos_cone*sin_cone + (1.5)*b_rsff*cos_cone*sin_cone
+    l75 = (1.5)*b_rey*cos_cone
+    l76 = (1.5)*b_rex*cos_cone
+    l77 = (1.5)*b_rex*cos_cone*sin_cone
+    l78 = (1.5)*b_rey*cos_cone*sin_cone
+    l79 = (1.5)*b_exey*sin_cone
+    l80 = (0.75)*b_exex*sin_cone - (0.75)*b_eyey*sin_cone
+    l81 = (0.375)*b_exex*(sin_cone*sin_cone) + (0.375)*b_exex - (0.375)*b_eyey*(sin_cone*sin_cone) - (0.375)*b_eyey
+    l82 = (0.75)*b_exey*(sin_cone*sin_cone) + (0.75)*b_exey
+    l83 = (0.75)*b_exex*(cos_cone*cos_cone) + (0.375)*b_exex*(sin_cone*sin_cone) + (0.75)*b_eyey*(cos_cone*cos_cone) + (0.375)*b_eyey*(sin_cone*sin_cone) + (0.75)*b_rsee - (0.375)*b_exex - (0.375)*b_eyey - (0.75)*b_rsee*(sin_cone*sin_cone)
+    l84 = (1.5)*b_fxey*sin_cone + (1.5)*b_fyex*sin_cone
+    l85 = (1.5)*b_fxex*sin_cone - (1.5)*b_fyey*sin_cone
+    l86 = (0.75)*b_fxex*(sin_cone*sin_cone) + (0.75)*b_fxex - (0.75)*b_fyey*(sin_cone*sin_cone) - (0.75)*b_fyey
+    l87 = (0.75)*b_fxey*(sin_cone*sin_cone) + (0.75)*b_fxey + (0.75)*b_fyex*(sin_cone*sin_cone) + (0.75)*b_fyex
+    l88 = (1.5)*b_fxex*(cos_cone*cos_cone) + (0.75)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fyey*(cos_cone*cos_cone) + (0.75)*b_fyey*(sin_cone*sin_cone) + (1.5)*b_rsfe - (0.75)*b_fxex - (0.75)*b_fyey - (1.5)*b_rsfe*(sin_cone*sin_cone)
+    l89 = (1.5)*b_rfy*cos_cone
+    l90 = (1.5)*b_rfx*cos_cone
+    l91 = (1.5)*b_rfx*cos_cone*sin_cone
+    l92 = (1.5)*b_rfy*cos_cone*sin_cone
+    l93 = (1.5)*b_fxfy*sin_cone
+    l94 = (0.75)*b_fxfx*sin_cone - (0.75)*b_fyfy*sin_cone
+    l95 = (0.375)*b_fxfx*(sin_cone*sin_cone) + (0.375)*b_fxfx - (0.375)*b_fyfy*(sin_cone*sin_cone) - (0.375)*b_fyfy
+    l96 = (0.75)*b_fxfy*(sin_cone*sin_cone) + (0.75)*b_fxfy
+    l97 = (0.75)*b_fxfx*(cos_cone*cos_cone) + (0.375)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fyfy*(cos_cone*cos_cone) + (0.375)*b_fyfy*(sin_cone*sin_cone) + (0.75)*b_rsff - (0.375)*b_fxfx - (0.375)*b_fyfy - (0.75)*b_rsff*(sin_cone*sin_cone)
+    l98 = 3.0*b_rex*cos_cone*sin_cone
+    l99 = 3.0*b_rey*cos_cone*sin_cone
+    l100 = (0.75)*b_exex*(sin_cone*sin_cone) + (0.75)*b_eyey - (0.75)*b_exex - (0.75)*b_eyey*(sin_cone*sin_cone)
+    l101 = (1.5)*b_exey*(sin_cone*sin_cone) - (1.5)*b_exey
+    l102 = (1.5)*b_exex*(cos_cone*cos_cone) + (0.75)*b_exex*(sin_cone*sin_cone) + (0.75)*b_exex + (1.5)*b_eyey*(cos_cone*cos_cone) + (0.75)*b_eyey*(sin_cone*sin_cone) + (0.75)*b_eyey - (1.5)*b_rsee*(sin_cone*sin_cone) - (1.5)*b_rsee
+    l103 = (1.5)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fyey - (1.5)*b_fxex - (1.5)*b_fyey*(sin_cone*sin_cone)
+    l104 = (1.5)*b_fxey*(sin_cone*sin_cone) + (1.5)*b_fyex*(sin_cone*sin_cone) - (1.5)*b_fxey - (1.5)*b_fyex
+    l105 = 3.0*b_fxex*(cos_cone*cos_cone) + (1.5)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fxex + 3.0*b_fyey*(cos_cone*cos_cone) + (1.5)*b_fyey*(sin_cone*sin_cone) + (1.5)*b_fyey - 3.0*b_rsfe*(sin_cone*sin_cone) - 3.0*b_rsfe
+    l106 = 3.0*b_rfx*cos_cone*sin_cone
+    l107 = 3.0*b_rfy*cos_cone*sin_cone
+    l108 = (0.75)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fyfy - (0.75)*b_fxfx - (0.75)*b_fyfy*(sin_cone*sin_cone)
+    l109 = (1.5)*b_fxfy*(sin_cone*sin_cone) - (1.5)*b_fxfy
+    l110 = (1.5)*b_fxfx*(cos_cone*cos_cone) + (0.75)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fxfx + (1.5)*b_fyfy*(cos_cone*cos_cone) + (0.75)*b_fyfy*(sin_cone*sin_cone) + (0.75)*b_fyfy - (1.5)*b_rsff*(sin_cone*sin_cone) - (1.5)*b_rsff
+    l111 = (1.5)*b_m2*(sin_cone*sin_cone) + (1.5)*b_m2
+    l112 = h_m + 3.0*b_m
+    l113 = gravity*t_gfa - t_ka
+    l114 = gravity*t_gss - t_ks
+    l115 = 3.0*cos_cone
+    l116 = (1.0/g_ratio)
+    l117 = g_ratio*g_rigid/g_efficiency
+    l118 = g_i*(g_ratio*g_ratio)*g_rigid/g_efficiency
+    l119 = b_fxfx + b_fyfy
+    l120 = b_fxex + b_fyey
+    l121 = 2.0*b_fxey*sin_cone - 2.0*b_fyex*sin_cone
+    l122 = 2.0*b_fxey*cos_cone - 2.0*b_fyex*cos_cone
+    l123 = b_fx*cos_cone
+    l124 = b_fy*cos_cone
+    l125 = b_rfy*cos_cone
+    l126 = b_rfx*cos_cone
+    l127 = b_fx*sin_cone
+    l128 = b_fy*sin_cone
+    l129 = b_rfy*sin_cone
+    l130 = b_rfx*sin_cone
+    l131 = b_sff*sin_cone
+    l132 = b_sff*cos_cone
+    l133 = b_sfe*sin_cone
+    l134 = b_fxey*sin_cone - b_fyex*sin_cone
+    l135 = b_sfe*cos_cone
+    l136 = b_fxey*cos_cone - b_fyex*cos_cone
+    l137 = b_rfx*cos_cone*sin_cone
+    l138 = b_rfy*cos_cone*sin_cone
+    l139 = b_rfx*(cos_cone*cos_cone) - b_rfx*(sin_cone*sin_cone)
+    l140 = b_rfy*(cos_cone*cos_cone) - b_rfy*(sin_cone*sin_cone)
+    l141 = (0.5)*b_fxfx*(cos_cone*cos_cone) - (0.5)*b_fyfy*(cos_cone*cos_cone)
+    l142 = b_fxfy*(cos_cone*cos_cone)
+    l143 = (0.5)*b_fxfx*(cos_cone*cos_cone) + b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fyfy*(cos_cone*cos_cone) + b_fyfy*(sin_cone*sin_cone) - b_rsff*(cos_cone*cos_cone)
+    l144 = (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fyfy - (0.5)*b_fxfx - (0.5)*b_fyfy*(sin_cone*sin_cone)
+    l145 = b_fxfy*(sin_cone*sin_cone) - b_fxfy
+    l146 = b_fxfx*(cos_cone*cos_cone) + (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fxfx + b_fyfy*(cos_cone*cos_cone) + (0.5)*b_fyfy*(sin_cone*sin_cone) + (0.5)*b_fyfy - b_rsff - b_rsff*(sin_cone*sin_cone)
+    l147 = 2.0*b_fxfy*cos_cone
+    l148 = b_fxfx*cos_cone - b_fyfy*cos_cone
+    l149 = b_fxfx*cos_cone*sin_cone - b_fyfy*cos_cone*sin_cone
+    l150 = 2.0*b_fxfy*cos_cone*sin_cone
+    l151 = b_fxfx*cos_cone*sin_cone + b_fyfy*cos_cone*sin_cone + 2.0*b_rsff*cos_cone*sin_cone
+    l152 = 2.0*b_fxfy*sin_cone
+    l153 = b_fxfx*sin_cone - b_fyfy*sin_cone
+    l154 = (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fxfx - (0.5)*b_fyfy*(sin_cone*sin_cone) - (0.5)*b_fyfy
+    l155 = b_fxfy + b_fxfy*(sin_cone*sin_cone)
+    l156 = b_rsff + b_fxfx*(cos_cone*cos_cone) + (0.5)*b_fxfx*(sin_cone*sin_cone) + b_fyfy*(cos_cone*cos_cone) + (0.5)*b_fyfy*(sin_cone*sin_cone) - (0.5)*b_fxfx - (0.5)*b_fyfy - b_rsff*(sin_cone*sin_cone)
+    l157 = (0.5)*b_fxex*(cos_cone*cos_cone) - (0.5)*b_fyey*(cos_cone*cos_cone)
+    l158 = (0.5)*b_fxey*(cos_cone*cos_cone) + (0.5)*b_fyex*(cos_cone*cos_cone)
+    l159 = (0.5)*b_fxex*(cos_cone*cos_cone) + b_fxex*(sin_cone*sin_cone) + (0.5)*b_fyey*(cos_cone*cos_cone) + b_fyey*(sin_cone*sin_cone) - b_rsfe*(cos_cone*cos_cone)
+    l160 = (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fyey - (0.5)*b_fxex - (0.5)*b_fyey*(sin_cone*sin_cone)
+    l161 = (0.5)*b_fxey*(sin_cone*sin_cone) + (0.5)*b_fyex*(sin_cone*sin_cone) - (0.5)*b_fxey - (0.5)*b_fyex
+    l162 = b_fxex*(cos_cone*cos_cone) + (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fxex + b_fyey*(cos_cone*cos_cone) + (0.5)*b_fyey*(sin_cone*sin_cone) + (0.5)*b_fyey - b_rsfe - b_rsfe*(sin_cone*sin_cone)
+    l163 = b_fxey*cos_cone + b_fyex*cos_cone
+    l164 = b_fxex*cos_cone - b_fyey*cos_cone
+    l165 = b_fxex*cos_cone*sin_cone - b_fyey*cos_cone*sin_cone
+    l166 = b_fxey*cos_cone*sin_cone + b_fyex*cos_cone*sin_cone
+    l167 = b_fxex*cos_cone*sin_cone + b_fyey*cos_cone*sin_cone + 2.0*b_rsfe*cos_cone*sin_cone
+    l168 = b_fxey*sin_cone + b_fyex*sin_cone
+    l169 = b_fxex*sin_cone - b_fyey*sin_cone
+    l170 = (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fxex - (0.5)*b_fyey*(sin_cone*sin_cone) - (0.5)*b_fyey
+    l171 = (0.5)*b_fxey*(sin_cone*sin_cone) + (0.5)*b_fxey + (0.5)*b_fyex*(sin_cone*sin_cone) + (0.5)*b_fyex
+    l172 = b_rsfe + b_fxex*(cos_cone*cos_cone) + (0.5)*b_fxex*(sin_cone*sin_cone) + b_fyey*(cos_cone*cos_cone) + (0.5)*b_fyey*(sin_cone*sin_cone) - (0.5)*b_fxex - (0.5)*b_fyey - b_rsfe*(sin_cone*sin_cone)
+    l173 = b_ex*cos_cone
+    l174 = b_ey*cos_cone
+    l175 = b_rey*cos_cone
+    l176 = b_rex*cos_cone
+    l177 = b_ex*sin_cone
+    l178 = b_ey*sin_cone
+    l179 = b_rey*sin_cone
+    l180 = b_rex*sin_cone
+    l181 = b_see*sin_cone
+    l182 = b_see*cos_cone
+    l183 = b_rex*cos_cone*sin_cone
+    l184 = b_rey*cos_cone*sin_cone
+    l185 = b_rex*(cos_cone*cos_cone) - b_rex*(sin_cone*sin_cone)
+    l186 = b_rey*(cos_cone*cos_cone) - b_rey*(sin_cone*sin_cone)
+    l187 = (0.5)*b_exex*(cos_cone*cos_cone) - (0.5)*b_eyey*(cos_cone*cos_cone)
+    l188 = b_exey*(cos_cone*cos_cone)
+    l189 = (0.5)*b_exex*(cos_cone*cos_cone) + b_exex*(sin_cone*sin_cone) + (0.5)*b_eyey*(cos_cone*cos_cone) + b_eyey*(sin_cone*sin_cone) - b_rsee*(cos_cone*cos_cone)
+    l190 = (0.5)*b_exex*(sin_cone*sin_cone) + (0.5)*b_eyey - (0.5)*b_exex - (0.5)*b_eyey*(sin_cone*sin_cone)
+    l191 = b_exey*(sin_cone*sin_cone) - b_exey
+    l192 = b_exex*(cos_cone*cos_cone) + (0.5)*b_exex*(sin_cone*sin_cone) + (0.5)*b_exex + b_eyey*(cos_cone*cos_cone) + (0.5)*b_eyey*(sin_cone*sin_cone) + (0.5)*b_eyey - b_rsee - b_rsee*(sin_cone*sin_cone)
+    l193 = 2.0*b_exey*cos_cone
+    l194 = b_exex*cos_cone - b_eyey*cos_cone
+    l195 = b_exex*cos_cone*sin_cone - b_eyey*cos_cone*sin_cone
+    l196 = 2.0*b_exey*cos_cone*sin_cone
+    l197 = b_exex*cos_cone*sin_cone + b_eyey*cos_cone*sin_cone + 2.0*b_rsee*cos_cone*sin_cone
+    l198 = 2.0*b_exey*sin_cone
+    l199 = b_exex*sin_cone - b_eyey*sin_cone
+    l200 = (0.5)*b_exex*(sin_cone*sin_cone) + (0.5)*b_exex - (0.5)*b_eyey*(sin_cone*sin_cone) - (0.5)*b_eyey
+    l201 = b_exey + b_exey*(sin_cone*sin_cone)
+    l202 = b_rsee + b_exex*(cos_cone*cos_cone) + (0.5)*b_exex*(sin_cone*sin_cone) + b_eyey*(cos_cone*cos_cone) + (0.5)*b_eyey*(sin_cone*sin_cone) - (0.5)*b_exex - (0.5)*b_eyey - b_rsee*(sin_cone*sin_cone)
+    l203 = b_exex + b_eyey
+    l204 = l120/l119
+    l205 = (1.0/l119)
+    l206 = (1.0/(l203 - (l120*l120)/l119))
+    l207 = g_efficiency/g_ratio
+    l208 = (1.0/g_i)
+    l209 = g_ratio*g_rigid
+    l210 = (0.5)*b_fxfx - (0.5)*b_fyfy
+    l211 = (0.5)*b_fxfx + (0.5)*b_fyfy
+    l212 = (0.5)*b_exex - (0.5)*b_eyey
+    l213 = (0.5)*b_exex + (0.5)*b_eyey
+    l214 = (0.5)*b_fxex - (0.5)*b_fyey
+    l215 = (0.5)*b_fxey + (0.5)*b_fyex
+    l216 = (0.5)*b_fxex + (0.5)*b_fyey
+    l217 = (0.5)*b_fxey - (0.5)*b_fyex
     return np.array([
         b_m,
         b_m1,
@@ -705,6 +908,209 @@ def constants(parameters):
         l12,
         l13,
         l14,
+        l15,
+        l16,
+        l17,
+        l18,
+        l19,
+        l20,
+        l21,
+        l22,
+        l23,
+        l24,
+        l25,
+        l26,
+        l27,
+        l28,
+        l29,
+        l30,
+        l31,
+        l32,
+        l33,
+        l34,
+        l35,
+        l36,
+        l37,
+        l38,
+        l39,
+        l40,
+        l41,
+        l42,
+        l43,
+        l44,
+        l45,
+        l46,
+        l47,
+        l48,
+        l49,
+        l50,
+        l51,
+        l52,
+        l53,
+        l54,
+        l55,
+        l56,
+        l57,
+        l58,
+        l59,
+        l60,
+        l61,
+        l62,
+        l63,
+        l64,
+        l65,
+        l66,
+        l67,
+        l68,
+        l69,
+        l70,
+        l71,
+        l72,
+        l73,
+        l74,
+        l75,
+        l76,
+        l77,
+        l78,
+        l79,
+        l80,
+        l81,
+        l82,
+        l83,
+        l84,
+        l85,
+        l86,
+        l87,
+        l88,
+        l89,
+        l90,
+        l91,
+        l92,
+        l93,
+        l94,
+        l95,
+        l96,
+        l97,
+        l98,
+        l99,
+        l100,
+        l101,
+        l102,
+        l103,
+        l104,
+        l105,
+        l106,
+        l107,
+        l108,
+        l109,
+        l110,
+        l111,
+        l112,
+        l113,
+        l114,
+        l115,
+        l116,
+        l117,
+        l118,
+        l119,
+        l120,
+        l121,
+        l122,
+        l123,
+        l124,
+        l125,
+        l126,
+        l127,
+        l128,
+        l129,
+        l130,
+        l131,
+        l132,
+        l133,
+        l134,
+        l135,
+        l136,
+        l137,
+        l138,
+        l139,
+        l140,
+        l141,
+        l142,
+        l143,
+        l144,
+        l145,
+        l146,
+        l147,
+        l148,
+        l149,
+        l150,
+        l151,
+        l152,
+        l153,
+        l154,
+        l155,
+        l156,
+        l157,
+        l158,
+        l159,
+        l160,
+        l161,
+        l162,
+        l163,
+        l164,
+        l165,
+        l166,
+        l167,
+        l168,
+        l169,
+        l170,
+        l171,
+        l172,
+        l173,
+        l174,
+        l175,
+        l176,
+        l177,
+        l178,
+        l179,
+        l180,
+        l181,
+        l182,
+        l183,
+        l184,
+        l185,
+        l186,
+        l187,
+        l188,
+        l189,
+        l190,
+        l191,
+        l192,
+        l193,
+        l194,
+        l195,
+        l196,
+        l197,
+        l198,
+        l199,
+        l200,
+        l201,
+        l202,
+        l203,
+        l204,
+        l205,
+        l206,
+        l207,
+        l208,
+        l209,
+        l210,
+        l211,
+        l212,
+        l213,
+        l214,
+        l215,
+        l216,
+        l217,
     ], dtype=np.float64)
 
 
@@ -1732,6 +2138,240 @@ theta_s = 2.0*theta_half_cos*theta_half_sin
 theta_c = 1.0 - 2.0*(theta_half_sin*theta_half_sin)
 theta_ss = 2.0*theta_c*theta_s
 theta_cc = 1.0 - 2.0*(theta_s*theta_s)
+l3 = constants[331]
+l4 = constants[332]
+k3_turned = l3*theta_c + l4*theta_s
+l7 = constants[335]
+l8 = constants[336]
+k6_turned = l7*theta_c + l8*theta_s
+l11 = constants[339]
+l12 = constants[340]
+k9_turned = l11*theta_c - l12*theta_s
+l13 = constants[341]
+l14 = constants[342]
+k10_turned = l13*theta_c + l14*theta_s
+l17 = constants[345]
+l18 = constants[346]
+k13_turned = l17*theta_c - l18*theta_s
+l19 = constants[347]
+l20 = constants[348]
+k14_turned = l19*theta_c + l20*theta_s
+l28 = constants[356]
+l29 = constants[357]
+k22_turned = l28*theta_c - l29*theta_s
+l30 = constants[358]
+l31 = constants[359]
+k23_turned = l30*theta_c - l31*theta_s
+l33 = constants[361]
+l34 = constants[362]
+k25_turned = l33*theta_c + l34*theta_s
+l35 = constants[363]
+l36 = constants[364]
+k26_turned = l35*theta_c - l36*theta_s
+l37 = constants[365]
+l38 = constants[366]
+k27_turned = l37*theta_c + l38*theta_s
+l39 = constants[367]
+l40 = constants[368]
+k28_turned = l39*theta_c - l40*theta_s
+l42 = constants[370]
+l43 = constants[371]
+k30_turned = l42*theta_c + l43*theta_s
+l44 = constants[372]
+l45 = constants[373]
+l46 = constants[374]
+k31_turned = l46 - l44*theta_cc - l45*theta_ss
+l47 = constants[375]
+l48 = constants[376]
+l49 = constants[377]
+k32_turned = l49 - l47*theta_cc - l48*theta_ss
+l50 = constants[378]
+l51 = constants[379]
+k33_turned = l50*theta_c + l51*theta_s
+l52 = constants[380]
+l53 = constants[381]
+l54 = constants[382]
+k34_turned = l54 - l52*theta_cc - l53*theta_ss
+l56 = constants[384]
+l57 = constants[385]
+k36_turned = l56*theta_c + l57*theta_s
+l58 = constants[386]
+l59 = constants[387]
+k37_turned = l58*theta_cc - l59*theta_ss
+l60 = constants[388]
+l61 = constants[389]
+l62 = constants[390]
+k38_turned = l62 + l60*theta_cc + l61*theta_ss
+l63 = constants[391]
+l64 = constants[392]
+k39_turned = l63*theta_cc - l64*theta_ss
+l65 = constants[393]
+l66 = constants[394]
+l67 = constants[395]
+k40_turned = l67 + l65*theta_cc + l66*theta_ss
+l68 = constants[396]
+l69 = constants[397]
+k41_turned = l68*theta_c + l69*theta_s
+l70 = constants[398]
+l71 = constants[399]
+k42_turned = l70*theta_cc - l71*theta_ss
+l72 = constants[400]
+l73 = constants[401]
+l74 = constants[402]
+k43_turned = l74 + l72*theta_cc + l73*theta_ss
+l75 = constants[403]
+l76 = constants[404]
+k44_turned = l75*theta_c - l76*theta_s
+l77 = constants[405]
+l78 = constants[406]
+k45_turned = l77*theta_c + l78*theta_s
+l79 = constants[407]
+l80 = constants[408]
+k46_turned = l79*theta_cc - l80*theta_ss
+l81 = constants[409]
+l82 = constants[410]
+l83 = constants[411]
+k47_turned = l83 - l81*theta_cc - l82*theta_ss
+l84 = constants[412]
+l85 = constants[413]
+k48_turned = l84*theta_cc - l85*theta_ss
+l86 = constants[414]
+l87 = constants[415]
+l88 = constants[416]
+k49_turned = l88 - l86*theta_cc - l87*theta_ss
+l89 = constants[417]
+l90 = constants[418]
+k50_turned = l89*theta_c - l90*theta_s
+l91 = constants[419]
+l92 = constants[420]
+k51_turned = l91*theta_c + l92*theta_s
+l93 = constants[421]
+l94 = constants[422]
+k52_turned = l93*theta_cc - l94*theta_ss
+l95 = constants[423]
+l96 = constants[424]
+l97 = constants[425]
+k53_turned = l97 - l95*theta_cc - l96*theta_ss
+l98 = constants[426]
+l99 = constants[427]
+k54_turned = l98*theta_c + l99*theta_s
+l100 = constants[428]
+l101 = constants[429]
+l102 = constants[430]
+k55_turned = l102 - l100*theta_cc - l101*theta_ss
+l103 = constants[431]
+l104 = constants[432]
+l105 = constants[433]
+k56_turned = l105 - l103*theta_cc - l104*theta_ss
+l106 = constants[434]
+l107 = constants[435]
+k57_turned = l106*theta_c + l107*theta_s
+l108 = constants[436]
+l109 = constants[437]
+l110 = constants[438]
+k58_turned = l110 - l108*theta_cc - l109*theta_ss
+l123 = constants[451]
+l124 = constants[452]
+k71_turned = l123*theta_c + l124*theta_s
+l125 = constants[453]
+l126 = constants[454]
+k72_turned = l125*theta_c - l126*theta_s
+l127 = constants[455]
+l128 = constants[456]
+k73_turned = l127*theta_c + l128*theta_s
+l129 = constants[457]
+l130 = constants[458]
+k74_turned = l129*theta_c - l130*theta_s
+l137 = constants[465]
+l138 = constants[466]
+k81_turned = l137*theta_c + l138*theta_s
+l139 = constants[467]
+l140 = constants[468]
+k82_turned = l139*theta_c + l140*theta_s
+l141 = constants[469]
+l142 = constants[470]
+l143 = constants[471]
+k83_turned = l143 - l141*theta_cc - l142*theta_ss
+l144 = constants[472]
+l145 = constants[473]
+l146 = constants[474]
+k84_turned = l146 - l144*theta_cc - l145*theta_ss
+l147 = constants[475]
+l148 = constants[476]
+k85_turned = l147*theta_cc - l148*theta_ss
+l149 = constants[477]
+l150 = constants[478]
+l151 = constants[479]
+k86_turned = l151 + l149*theta_cc + l150*theta_ss
+l152 = constants[480]
+l153 = constants[481]
+k87_turned = l152*theta_cc - l153*theta_ss
+l154 = constants[482]
+l155 = constants[483]
+l156 = constants[484]
+k88_turned = l156 - l154*theta_cc - l155*theta_ss
+l157 = constants[485]
+l158 = constants[486]
+l159 = constants[487]
+k89_turned = l159 - l157*theta_cc - l158*theta_ss
+l160 = constants[488]
+l161 = constants[489]
+l162 = constants[490]
+k90_turned = l162 - l160*theta_cc - l161*theta_ss
+l163 = constants[491]
+l164 = constants[492]
+k91_turned = l163*theta_cc - l164*theta_ss
+l165 = constants[493]
+l166 = constants[494]
+l167 = constants[495]
+k92_turned = l167 + l165*theta_cc + l166*theta_ss
+l168 = constants[496]
+l169 = constants[497]
+k93_turned = l168*theta_cc - l169*theta_ss
+l170 = constants[498]
+l171 = constants[499]
+l172 = constants[500]
+k94_turned = l172 - l170*theta_cc - l171*theta_ss
+l173 = constants[501]
+l174 = constants[502]
+k95_turned = l173*theta_c + l174*theta_s
+l175 = constants[503]
+l176 = constants[504]
+k96_turned = l175*theta_c - l176*theta_s
+l177 = constants[505]
+l178 = constants[506]
+k97_turned = l177*theta_c + l178*theta_s
+l179 = constants[507]
+l180 = constants[508]
+k98_turned = l179*theta_c - l180*theta_s
+l183 = constants[511]
+l184 = constants[512]
+k101_turned = l183*theta_c + l184*theta_s
+l185 = constants[513]
+l186 = constants[514]
+k102_turned = l185*theta_c + l186*theta_s
+l187 = constants[515]
+l188 = constants[516]
+l189 = constants[517]
+k103_turned = l189 - l187*theta_cc - l188*theta_ss
+l190 = constants[518]
+l191 = constants[519]
+l192 = constants[520]
+k104_turned = l192 - l190*theta_cc - l191*theta_ss
+l193 = constants[521]
+l194 = constants[522]
+k105_turned = l193*theta_cc - l194*theta_ss
+l195 = constants[523]
+l196 = constants[524]
+l197 = constants[525]
+k106_turned = l197 + l195*theta_cc + l196*theta_ss
+l198 = constants[526]
+l199 = constants[527]
+k107_turned = l198*theta_cc - l199*theta_ss
+l200 = constants[528]
+l201 = constants[529]
+l202 = constants[530]
+k108_turned = l202 - l200*theta_cc - l201*theta_ss
 b_fx = constants[3]
 b_fy = constants[4]
 b_fx_turned = b_fx*theta_c + b_fy*theta_s
@@ -1757,37 +2397,29 @@ b_tip_ey = constants[35]
 b_tip_ex_turned = b_tip_ex*theta_c + b_tip_ey*theta_s
 b_tip_ey_turned = b_tip_ey*theta_c - b_tip_ex*theta_s
 b_fxfy = constants[13]
-l7 = constants[335]
-u19 = b_fxfy*theta_ss + l7*theta_cc
-l8 = constants[336]
-b_fxfx_turned = l8 + u19
-b_fyfy_turned = l8 - u19
-b_fxfy_turned = b_fxfy*theta_cc - l7*theta_ss
+l210 = constants[538]
+u19 = b_fxfy*theta_ss + l210*theta_cc
+l211 = constants[539]
+b_fxfx_turned = l211 + u19
+b_fyfy_turned = l211 - u19
+b_fxfy_turned = b_fxfy*theta_cc - l210*theta_ss
 b_exey = constants[16]
-l9 = constants[337]
-u20 = b_exey*theta_ss + l9*theta_cc
-l10 = constants[338]
-b_exex_turned = l10 + u20
-b_eyey_turned = l10 - u20
-b_exey_turned = b_exey*theta_cc - l9*theta_ss
-l11 = constants[339]
-l12 = constants[340]
-u21 = l11*theta_cc + l12*theta_ss
-l13 = constants[341]
-b_fxex_turned = l13 + u21
-b_fyey_turned = l13 - u21
-u22 = l11*theta_ss
-l14 = constants[342]
-b_fxey_turned = l14 + l12*theta_cc - u22
-b_fyex_turned = l12*theta_cc - l14 - u22
-f1d = x[12]
-f2d = x[13]
-f3d = x[14]
-d_mean = (0.3333333333333333)*f1d + (0.3333333333333333)*f2d + (0.3333333333333333)*f3d
-e1d = x[15]
-e2d = x[16]
-e3d = x[17]
-g_mean = (0.3333333333333333)*e1d + (0.3333333333333333)*e2d + (0.3333333333333333)*e3d
+l212 = constants[540]
+u20 = b_exey*theta_ss + l212*theta_cc
+l213 = constants[541]
+b_exex_turned = l213 + u20
+b_eyey_turned = l213 - u20
+b_exey_turned = b_exey*theta_cc - l212*theta_ss
+l214 = constants[542]
+l215 = constants[543]
+u21 = l214*theta_cc + l215*theta_ss
+l216 = constants[544]
+b_fxex_turned = l216 + u21
+b_fyey_turned = l216 - u21
+u22 = l214*theta_ss
+l217 = constants[545]
+b_fxey_turned = l217 + l215*theta_cc - u22
+b_fyex_turned = l215*theta_cc - l217 - u22
 a = x[0]
 t_slope_fa = constants[68]
 pitch_angle = a*t_slope_fa
@@ -1906,329 +2538,828 @@ skew_sin = (-u37) - u38
 uniform_mean = cos_tilt*w_fold_mean
 uniform_cos = cos_tilt*w_fold_cos
 uniform_sin = cos_tilt*w_fold_sin
-add = derivative[10]
-sdd = derivative[11]
+f1 = x[2]
+f2 = x[3]
+f3 = x[4]
+f_mean = (0.3333333333333333)*f1 + (0.3333333333333333)*f2 + (0.3333333333333333)*f3
+f_cos = f1 - f_mean
+half_sqrt3 = 0.8660254037844386
+u40 = (0.5)/half_sqrt3
+f_sin = u40*(f2 - f3)
+f1d = x[12]
+f2d = x[13]
+f3d = x[14]
+d_mean = (0.3333333333333333)*f1d + (0.3333333333333333)*f2d + (0.3333333333333333)*f3d
+d_cos = f1d - d_mean
+d_sin = u40*(f2d - f3d)
+u41 = (f1*f1)
+ff_of_1 = u41
+u42 = (f2*f2)
+ff_of_2 = u42
+u43 = (f3*f3)
+ff_of_3 = u43
+ff_mean = (0.3333333333333333)*ff_of_1 + (0.3333333333333333)*ff_of_2 + (0.3333333333333333)*ff_of_3
+ff_cos = ff_of_1 - ff_mean
+ff_sin = u40*(ff_of_2 - ff_of_3)
+u44 = 2.0*f1
+fd_of_1 = f1d*u44
+u45 = 2.0*f2
+fd_of_2 = f2d*u45
+u46 = 2.0*f3
+fd_of_3 = f3d*u46
+fd_mean = (0.3333333333333333)*fd_of_1 + (0.3333333333333333)*fd_of_2 + (0.3333333333333333)*fd_of_3
+fd_cos = fd_of_1 - fd_mean
+fd_sin = u40*(fd_of_2 - fd_of_3)
+u47 = (f1d*f1d)
+dd_of_1 = u47
+u48 = (f2d*f2d)
+dd_of_2 = u48
+u49 = (f3d*f3d)
+dd_of_3 = u49
+dd_mean = (0.3333333333333333)*dd_of_1 + (0.3333333333333333)*dd_of_2 + (0.3333333333333333)*dd_of_3
+dd_cos = dd_of_1 - dd_mean
+dd_sin = u40*(dd_of_2 - dd_of_3)
+e1 = x[5]
+e2 = x[6]
+e3 = x[7]
+e_mean = (0.3333333333333333)*e1 + (0.3333333333333333)*e2 + (0.3333333333333333)*e3
+e_cos = e1 - e_mean
+e_sin = u40*(e2 - e3)
+e1d = x[15]
+e2d = x[16]
+e3d = x[17]
+g_mean = (0.3333333333333333)*e1d + (0.3333333333333333)*e2d + (0.3333333333333333)*e3d
+g_cos = e1d - g_mean
+g_sin = u40*(e2d - e3d)
+u50 = e1*f1
+ef_of_1 = u50
+u51 = e2*f2
+ef_of_2 = u51
+u52 = e3*f3
+ef_of_3 = u52
+ef_mean = (0.3333333333333333)*ef_of_1 + (0.3333333333333333)*ef_of_2 + (0.3333333333333333)*ef_of_3
+ef_cos = ef_of_1 - ef_mean
+ef_sin = u40*(ef_of_2 - ef_of_3)
+u53 = (e1*e1)
+ee_of_1 = u53
+u54 = (e2*e2)
+ee_of_2 = u54
+u55 = (e3*e3)
+ee_of_3 = u55
+ee_mean = (0.3333333333333333)*ee_of_1 + (0.3333333333333333)*ee_of_2 + (0.3333333333333333)*ee_of_3
+ee_cos = ee_of_1 - ee_mean
+ee_sin = u40*(ee_of_2 - ee_of_3)
+u56 = e1*f1d
+u57 = e1d*f1
+ef_rate_of_1 = u56 + u57
+u58 = e2*f2d
+u59 = e2d*f2
+ef_rate_of_2 = u58 + u59
+u60 = e3*f3d
+u61 = e3d*f3
+ef_rate_of_3 = u60 + u61
+ef_rate_mean = (0.3333333333333333)*ef_rate_of_1 + (0.3333333333333333)*ef_rate_of_2 + (0.3333333333333333)*ef_rate_of_3
+ef_rate_cos = ef_rate_of_1 - ef_rate_mean
+ef_rate_sin = u40*(ef_rate_of_2 - ef_rate_of_3)
+u62 = 2.0*e1
+eg_of_1 = e1d*u62
+u63 = 2.0*e2
+eg_of_2 = e2d*u63
+u64 = 2.0*e3
+eg_of_3 = e3d*u64
+eg_mean = (0.3333333333333333)*eg_of_1 + (0.3333333333333333)*eg_of_2 + (0.3333333333333333)*eg_of_3
+eg_cos = eg_of_1 - eg_mean
+eg_sin = u40*(eg_of_2 - eg_of_3)
+turn_of_1 = u56 - u57
+turn_of_2 = u58 - u59
+turn_of_3 = u60 - u61
+turn_mean = (0.3333333333333333)*turn_of_1 + (0.3333333333333333)*turn_of_2 + (0.3333333333333333)*turn_of_3
+turn_cos = turn_of_1 - turn_mean
+turn_sin = u40*(turn_of_2 - turn_of_3)
+u65 = e1d*f1d
+dg_of_1 = u65
+u66 = e2d*f2d
+dg_of_2 = u66
+u67 = e3d*f3d
+dg_of_3 = u67
+dg_mean = (0.3333333333333333)*dg_of_1 + (0.3333333333333333)*dg_of_2 + (0.3333333333333333)*dg_of_3
+dg_cos = dg_of_1 - dg_mean
+dg_sin = u40*(dg_of_2 - dg_of_3)
+u68 = (e1d*e1d)
+gg_of_1 = u68
+u69 = (e2d*e2d)
+gg_of_2 = u69
+u70 = (e3d*e3d)
+gg_of_3 = u70
+gg_mean = (0.3333333333333333)*gg_of_1 + (0.3333333333333333)*gg_of_2 + (0.3333333333333333)*gg_of_3
+gg_cos = gg_of_1 - gg_mean
+gg_sin = u40*(gg_of_2 - gg_of_3)
+l10 = constants[338]
+l5 = constants[333]
+l6 = constants[334]
+l9 = constants[337]
+rs_x = l10 + e_mean*k3_turned + f_mean*k6_turned - ee_mean*l5 - ef_mean*l6 - ff_mean*l9
+l15 = constants[343]
+l16 = constants[344]
+l21 = constants[349]
+rs_y = e_cos*k9_turned + e_sin*k10_turned + ee_sin*l15 + ef_sin*l16 + f_cos*k13_turned + f_sin*k14_turned + ff_sin*l21
+rs_z = e_sin*k9_turned + f_sin*k13_turned - e_cos*k10_turned - ee_cos*l15 - ef_cos*l16 - f_cos*k14_turned - ff_cos*l21
+rsd_x = d_mean*k6_turned + g_mean*k3_turned - ef_rate_mean*l6 - eg_mean*l5 - fd_mean*l9
+rsd_y = d_cos*k13_turned + d_sin*k14_turned + ef_rate_sin*l16 + eg_sin*l15 + fd_sin*l21 + g_cos*k9_turned + g_sin*k10_turned
+rsd_z = d_sin*k13_turned + g_sin*k9_turned - d_cos*k14_turned - ef_rate_cos*l16 - eg_cos*l15 - fd_cos*l21 - g_cos*k10_turned
+l22 = constants[350]
+l23 = constants[351]
+l24 = constants[352]
+rsdd_x = (-dd_mean*l22) - dg_mean*l23 - gg_mean*l24
+l25 = constants[353]
+l26 = constants[354]
+l27 = constants[355]
+rsdd_y = dd_sin*l25 + dg_sin*l26 + gg_sin*l27
+rsdd_z = (-dd_cos*l25) - dg_cos*l26 - gg_cos*l27
+l32 = constants[360]
+rl_x = (-d_mean*k22_turned) - g_mean*k23_turned - l32*turn_mean
+u71 = d_sin*k26_turned
+u72 = g_sin*k28_turned
+l41 = constants[369]
+rl_y = d_cos*k25_turned + g_cos*k27_turned + l41*turn_sin - u71 - u72
+u73 = d_cos*k26_turned + g_cos*k28_turned
+rl_z = u73 + d_sin*k25_turned + g_sin*k27_turned - l41*turn_cos
+l55 = constants[383]
+ri_xx = l55 + ee_mean*k31_turned + ef_mean*k32_turned + ff_mean*k34_turned - e_mean*k30_turned - f_mean*k33_turned
+ri_xy = e_sin*k36_turned + f_sin*k41_turned - e_cos*k28_turned - ee_cos*k37_turned - ee_sin*k38_turned - ef_cos*k39_turned - ef_sin*k40_turned - f_cos*k26_turned - ff_cos*k42_turned - ff_sin*k43_turned
+ri_xz = ee_cos*k38_turned + ef_cos*k40_turned + ff_cos*k43_turned - e_cos*k36_turned - e_sin*k28_turned - ee_sin*k37_turned - ef_sin*k39_turned - f_cos*k41_turned - f_sin*k26_turned - ff_sin*k42_turned
+ri_yz = e_sin*k45_turned + ee_cos*k46_turned + ee_sin*k47_turned + ef_cos*k48_turned + ef_sin*k49_turned + f_sin*k51_turned + ff_cos*k52_turned + ff_sin*k53_turned - e_cos*k44_turned - f_cos*k50_turned
+l111 = constants[439]
+ri_mean = l111 + e_mean*k54_turned + ee_mean*k55_turned + ef_mean*k56_turned + f_mean*k57_turned + ff_mean*k58_turned
+ri_difference = ee_sin*k46_turned + ef_sin*k48_turned + ff_sin*k52_turned - e_cos*k45_turned - e_sin*k44_turned - ee_cos*k47_turned - ef_cos*k49_turned - f_cos*k51_turned - f_sin*k50_turned - ff_cos*k53_turned
+ri_yy = ri_difference + ri_mean
+ri_zz = ri_mean - ri_difference
+h_ixx = constants[44]
+rih_xx = h_ixx + ri_xx
+h_itt = constants[45]
+rih_yy = h_itt + ri_yy
+rih_zz = h_itt + ri_zz
+rid_xx = ef_rate_mean*k32_turned + eg_mean*k31_turned + fd_mean*k34_turned - d_mean*k33_turned - g_mean*k30_turned
+rid_xy = d_sin*k41_turned + g_sin*k36_turned - u73 - ef_rate_cos*k39_turned - ef_rate_sin*k40_turned - eg_cos*k37_turned - eg_sin*k38_turned - fd_cos*k42_turned - fd_sin*k43_turned
+rid_xz = ef_rate_cos*k40_turned + eg_cos*k38_turned + fd_cos*k43_turned - u71 - u72 - d_cos*k41_turned - ef_rate_sin*k39_turned - eg_sin*k37_turned - fd_sin*k42_turned - g_cos*k36_turned
+rid_yz = d_sin*k51_turned + ef_rate_cos*k48_turned + ef_rate_sin*k49_turned + eg_cos*k46_turned + eg_sin*k47_turned + fd_cos*k52_turned + fd_sin*k53_turned + g_sin*k45_turned - d_cos*k50_turned - g_cos*k44_turned
+rid_mean = d_mean*k57_turned + ef_rate_mean*k56_turned + eg_mean*k55_turned + fd_mean*k58_turned + g_mean*k54_turned
+rid_difference = ef_rate_sin*k48_turned + eg_sin*k46_turned + fd_sin*k52_turned - d_cos*k51_turned - d_sin*k50_turned - ef_rate_cos*k49_turned - eg_cos*k47_turned - fd_cos*k53_turned - g_cos*k45_turned - g_sin*k44_turned
+rid_yy = rid_difference + rid_mean
+rid_zz = rid_mean - rid_difference
+turning_x = rid_xx*wf_x + rid_xy*won_y + rid_xz*won_z
+turning_y = rid_xy*wf_x + rid_yy*won_y + rid_yz*won_z
+turning_z = rid_xz*wf_x + rid_yz*won_y + rid_zz*won_z
+rot_whirl_x = rs_z*won_y + 2.0*rsd_x - rs_y*won_z
+rot_whirl_y = rs_x*won_z + 2.0*rsd_y - rs_z*wf_x
+rot_whirl_z = rs_y*wf_x + 2.0*rsd_z - rs_x*won_y
+rot_momentum_x = rl_x + ri_xy*won_y + ri_xz*won_z + rih_xx*wf_x
+rot_momentum_y = rl_y + ri_xy*wf_x + ri_yz*won_z + rih_yy*won_y
+rot_momentum_z = rl_z + ri_xz*wf_x + ri_yz*won_y + rih_zz*won_z
+l112 = constants[440]
+rot_force_x = rsdd_x + acc_f_s_x*l112 + rot_whirl_z*won_y + rs_z*spin_h_y - rot_whirl_y*won_z - rs_y*spin_h_z
+rot_force_y = rsdd_y + acc_f_y*l112 + rot_whirl_x*won_z + rs_x*spin_h_z - rot_whirl_z*wf_x - rs_z*spin_f_s_x
+rot_force_z = rsdd_z + acc_f_z*l112 + rot_whirl_y*wf_x + rs_y*spin_f_s_x - rot_whirl_x*won_y - rs_x*spin_h_y
+rot_moment_x = turning_x + acc_f_z*rs_y + ri_xy*spin_h_y + ri_xz*spin_h_z + rih_xx*spin_f_s_x + rot_momentum_z*won_y - acc_f_y*rs_z - rot_momentum_y*won_z
+rot_moment_y = turning_y + acc_f_s_x*rs_z + ri_xy*spin_f_s_x + ri_yz*spin_h_z + rih_yy*spin_h_y + rot_momentum_x*won_z - acc_f_z*rs_x - rot_momentum_z*wf_x
+rot_moment_z = turning_z + acc_f_y*rs_x + ri_xz*spin_f_s_x + ri_yz*spin_h_y + rih_zz*spin_h_z + rot_momentum_y*wf_x - acc_f_s_x*rs_y - rot_momentum_x*won_y
+n_y = constants[50]
+n_z = constants[51]
+u74 = ta_x + n_z*wa_y - n_y*wa_z
+nac_ta_x = u74
+n_x = constants[49]
+u75 = ta_y + n_x*wa_z
+nac_ta_y = u75
+u76 = (-u30) - n_x*wa_y
+nac_ta_z = u76
+u77 = ts_y + n_z*t_slope_ss
+nac_ts_y = u77
+u78 = ts_z - n_y*t_slope_ss
+nac_ts_z = u78
+u79 = n_y*wn_x - n_x*wn_y
+u80 = n_x*wn_z - n_z*wn_x
+u81 = top_x + n_z*spin_n_y + u79*wn_y - n_y*spin_n_z - u80*wn_z
+nac_acc_x = u81
+u82 = n_z*wn_y - n_y*wn_z
+u83 = top_y + n_x*spin_n_z + u82*wn_z - u79*wn_x
+nac_acc_y = u83
+u84 = u80*wn_x - u35 - n_x*spin_n_y - u82*wn_y
+nac_acc_z = u84
+n_iyy = constants[53]
+u85 = n_iyy*u34
+n_izz = constants[54]
+u86 = n_izz*u34
+nac_moment_x = u86 - u85
+u87 = wn_x*wn_z
+n_ixx = constants[52]
+u88 = n_ixx*u87 - n_izz*u87
+nac_moment_y = u88 + n_iyy*spin_n_y
+u89 = n_iyy*u33 - n_ixx*u33
+nac_moment_z = u89 + n_izz*spin_n_z
+l115 = constants[443]
+pressure_x = l115*pressure
+pressure_yz = (1.5)*pressure
+pressure_rx = pressure_x*radius
+pressure_ryz = pressure_yz*radius
+u90 = c_thrust*relative_x
+aero_force_x = pressure_x*(u90 + c_thrust_edge*g_mean + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
+u91 = c_tangential_kappa*kappa_cos + c_tangential_skew*skew_cos + c_tangential_y*relative_y
+sin_cone = constants[40]
+aero_force_y = pressure_yz*(sin_cone*(c_thrust_edge*g_sin + c_thrust_flap*d_sin + c_thrust_kappa*kappa_sin + c_thrust_skew*skew_sin + c_thrust_w*uniform_sin + c_thrust_y*relative_z) - u91 - c_tangential_edge*g_cos - c_tangential_flap*d_cos - c_tangential_w*uniform_cos)
+u92 = c_thrust_kappa*kappa_cos + c_thrust_skew*skew_cos + c_thrust_y*relative_y
+aero_force_z = pressure_yz*((-c_tangential_edge*g_sin) - c_tangential_flap*d_sin - c_tangential_kappa*kappa_sin - c_tangential_skew*skew_sin - c_tangential_w*uniform_sin - c_tangential_y*relative_z - sin_cone*(u92 + c_thrust_edge*g_cos + c_thrust_flap*d_cos + c_thrust_w*uniform_cos))
+u93 = c_torque*relative_x
+aero_moment_x = pressure_rx*(u93 + c_torque_edge*g_mean + c_torque_flap*d_mean + c_torque_w*uniform_mean)
+u94 = c_bending_kappa*kappa_cos + c_bending_skew*skew_cos + c_bending_y*relative_y
+aero_moment_y = pressure_ryz*(u94 + c_bending_edge*g_cos + c_bending_flap*d_cos + c_bending_w*uniform_cos + sin_cone*(c_torque_edge*g_sin + c_torque_flap*d_sin + c_torque_kappa*kappa_sin + c_torque_skew*skew_sin + c_torque_w*uniform_sin + c_torque_y*relative_z))
+u95 = c_torque_kappa*kappa_cos + c_torque_skew*skew_cos + c_torque_y*relative_y
+aero_moment_z = pressure_ryz*(c_bending_edge*g_sin + c_bending_flap*d_sin + c_bending_kappa*kappa_sin + c_bending_skew*skew_sin + c_bending_w*uniform_sin + c_bending_y*relative_z - sin_cone*(u95 + c_torque_edge*g_cos + c_torque_flap*d_cos + c_torque_w*uniform_cos))
+net_force_x = aero_force_x - rot_force_x
+net_force_y = aero_force_y - rot_force_y
+net_force_z = aero_force_z - rot_force_z
+net_moment_x = aero_moment_x - rot_moment_x
+net_moment_y = aero_moment_y - rot_moment_y
+net_moment_z = aero_moment_z - rot_moment_z
+d_d = constants[60]
+d_k = constants[59]
+gen = x[9]
+gend = x[19]
+l116 = constants[444]
+l117 = constants[445]
+torque_shaft = d_d*(phid - gend*l116) + d_k*(phi - gen*l116) + l117*torque_commanded
+mom_a_x = l112*tha_s_x + rs_z*wha_y - rs_y*wha_z
+mom_a_y = l112*tha_y + rs_x*wha_z - rs_z*wha_s_x
+mom_a_z = l112*tha_z + rs_y*wha_s_x - rs_x*wha_y
+ang_a_x = ri_xy*wha_y + ri_xz*wha_z + rih_xx*wha_s_x + rs_y*tha_z - rs_z*tha_y
+ang_a_y = ri_xy*wha_s_x + ri_yz*wha_z + rih_yy*wha_y + rs_z*tha_s_x - rs_x*tha_z
+ang_a_z = ri_xz*wha_s_x + ri_yz*wha_y + rih_zz*wha_z + rs_x*tha_y - rs_y*tha_s_x
+mom_s_x = l112*ths_s_x + rs_z*whs_y - rs_y*whs_z
+mom_s_y = l112*ths_y + rs_x*whs_z - rs_z*whs_s_x
+mom_s_z = l112*ths_z + rs_y*whs_s_x - rs_x*whs_y
+ang_s_x = ri_xy*whs_y + ri_xz*whs_z + rih_xx*whs_s_x + rs_y*ths_z - rs_z*ths_y
+ang_s_y = ri_xy*whs_s_x + ri_yz*whs_z + rih_yy*whs_y + rs_z*ths_s_x - rs_x*ths_z
+ang_s_z = ri_xz*whs_s_x + ri_yz*whs_y + rih_zz*whs_z + rs_x*ths_y - rs_y*ths_s_x
+l121 = constants[449]
+gyro_mean = -l121*wf_x
+l122 = constants[450]
+gyro_cos = -l122*won_z
+gyro_sin = l122*won_y
+gyro_other = gyro_mean - (0.5)*gyro_cos
+gyro_1 = gyro_cos + gyro_mean
+u96 = gyro_sin*half_sqrt3
+gyro_2 = gyro_other + u96
+gyro_3 = gyro_other - u96
+w_xx = (wf_x*wf_x)
+u97 = wf_x*won_y
+w_xy = u97
+u98 = wf_x*won_z
+w_xz = u98
+w_yz = won_y*won_z
+w_yy = (won_y*won_y)
+w_zz = (won_z*won_z)
+u99 = (0.5)*w_yy
+u100 = (0.5)*w_zz
+w_mean = u100 + u99
+w_diff = u99 - u100
+q_f_fixed_mean = k72_turned*spin_f_s_x + k81_turned*w_mean + pressure*(c_flap*relative_x + c_flap_w*uniform_mean) - acc_f_s_x*k71_turned - k81_turned*w_xx
+q_f_fixed_cos = acc_f_z*k73_turned + pressure*(c_flap_kappa*kappa_cos + c_flap_skew*skew_cos + c_flap_w*uniform_cos + c_flap_y*relative_y) - acc_f_y*b_fy_turned - b_rfx_turned*spin_h_y - k72_turned*w_yz - k74_turned*spin_h_z - k74_turned*w_xy - k81_turned*w_diff - k82_turned*w_xz
+q_f_fixed_sin = k74_turned*spin_h_y + k81_turned*w_yz + k82_turned*w_xy + pressure*(c_flap_kappa*kappa_sin + c_flap_skew*skew_sin + c_flap_w*uniform_sin + c_flap_y*relative_z) - acc_f_y*k73_turned - acc_f_z*b_fy_turned - b_rfx_turned*spin_h_z - k72_turned*w_diff - k74_turned*w_xz
+q_f_fixed_other = q_f_fixed_mean - (0.5)*q_f_fixed_cos
+q_f_fixed_1 = q_f_fixed_cos + q_f_fixed_mean
+u101 = half_sqrt3*q_f_fixed_sin
+q_f_fixed_2 = q_f_fixed_other + u101
+q_f_fixed_3 = q_f_fixed_other - u101
+b_kf = constants[27]
+l131 = constants[459]
+q_f_by_flap_mean = acc_f_s_x*l131 + k83_turned*w_xx + k84_turned*w_mean - b_kf
+l132 = constants[460]
+q_f_by_flap_cos = acc_f_z*l132 + k86_turned*w_xz + k87_turned*w_yz - k85_turned*w_xy - k88_turned*w_diff
+q_f_by_flap_sin = k87_turned*w_diff + k88_turned*w_yz - acc_f_y*l132 - k85_turned*w_xz - k86_turned*w_xy
+q_f_by_flap_other = q_f_by_flap_mean - (0.5)*q_f_by_flap_cos
+q_f_by_flap_1 = q_f_by_flap_cos + q_f_by_flap_mean
+u102 = half_sqrt3*q_f_by_flap_sin
+q_f_by_flap_2 = q_f_by_flap_other + u102
+q_f_by_flap_3 = q_f_by_flap_other - u102
+l134 = constants[462]
+u103 = l134*spin_f_s_x
+b_kfe = constants[29]
+l133 = constants[461]
+u104 = acc_f_s_x*l133 + k89_turned*w_xx + k90_turned*w_mean - b_kfe
+q_f_by_edge_mean = u103 + u104
+l136 = constants[464]
+u105 = l136*spin_h_z
+l135 = constants[463]
+u106 = acc_f_z*l135 + k92_turned*w_xz + k93_turned*w_yz - k91_turned*w_xy - k94_turned*w_diff
+q_f_by_edge_cos = u105 + u106
+u107 = l136*spin_h_y
+u108 = acc_f_y*l135 + k91_turned*w_xz + k92_turned*w_xy - k93_turned*w_diff - k94_turned*w_yz
+q_f_by_edge_sin = (-u107) - u108
+q_f_by_edge_other = q_f_by_edge_mean - (0.5)*q_f_by_edge_cos
+q_f_by_edge_1 = q_f_by_edge_cos + q_f_by_edge_mean
+u109 = half_sqrt3*q_f_by_edge_sin
+q_f_by_edge_2 = q_f_by_edge_other + u109
+q_f_by_edge_3 = q_f_by_edge_other - u109
+b_df = constants[30]
+flap_flap = c_flap_flap*pressure - b_df
+flap_edge = c_flap_edge*pressure
+q_f1 = q_f_fixed_1 + e1*q_f_by_edge_1 + e1d*flap_edge + f1*q_f_by_flap_1 + f1d*flap_flap - e1d*gyro_1
+q_f2 = q_f_fixed_2 + e2*q_f_by_edge_2 + e2d*flap_edge + f2*q_f_by_flap_2 + f2d*flap_flap - e2d*gyro_2
+q_f3 = q_f_fixed_3 + e3*q_f_by_edge_3 + e3d*flap_edge + f3*q_f_by_flap_3 + f3d*flap_flap - e3d*gyro_3
+q_e_fixed_mean = k101_turned*w_mean + k96_turned*spin_f_s_x + pressure*(c_edge*relative_x + c_edge_w*uniform_mean) - acc_f_s_x*k95_turned - k101_turned*w_xx
+q_e_fixed_cos = acc_f_z*k97_turned + pressure*(c_edge_kappa*kappa_cos + c_edge_skew*skew_cos + c_edge_w*uniform_cos + c_edge_y*relative_y) - acc_f_y*b_ey_turned - b_rex_turned*spin_h_y - k101_turned*w_diff - k102_turned*w_xz - k96_turned*w_yz - k98_turned*spin_h_z - k98_turned*w_xy
+q_e_fixed_sin = k101_turned*w_yz + k102_turned*w_xy + k98_turned*spin_h_y + pressure*(c_edge_kappa*kappa_sin + c_edge_skew*skew_sin + c_edge_w*uniform_sin + c_edge_y*relative_z) - acc_f_y*k97_turned - acc_f_z*b_ey_turned - b_rex_turned*spin_h_z - k96_turned*w_diff - k98_turned*w_xz
+q_e_fixed_other = q_e_fixed_mean - (0.5)*q_e_fixed_cos
+q_e_fixed_1 = q_e_fixed_cos + q_e_fixed_mean
+u110 = half_sqrt3*q_e_fixed_sin
+q_e_fixed_2 = q_e_fixed_other + u110
+q_e_fixed_3 = q_e_fixed_other - u110
+q_e_by_flap_mean = u104 - u103
+q_e_by_flap_cos = u106 - u105
+q_e_by_flap_sin = u107 - u108
+q_e_by_flap_other = q_e_by_flap_mean - (0.5)*q_e_by_flap_cos
+q_e_by_flap_1 = q_e_by_flap_cos + q_e_by_flap_mean
+u111 = half_sqrt3*q_e_by_flap_sin
+q_e_by_flap_2 = q_e_by_flap_other + u111
+q_e_by_flap_3 = q_e_by_flap_other - u111
+b_ke = constants[28]
+l181 = constants[509]
+q_e_by_edge_mean = acc_f_s_x*l181 + k103_turned*w_xx + k104_turned*w_mean - b_ke
+l182 = constants[510]
+q_e_by_edge_cos = acc_f_z*l182 + k106_turned*w_xz + k107_turned*w_yz - k105_turned*w_xy - k108_turned*w_diff
+q_e_by_edge_sin = k107_turned*w_diff + k108_turned*w_yz - acc_f_y*l182 - k105_turned*w_xz - k106_turned*w_xy
+q_e_by_edge_other = q_e_by_edge_mean - (0.5)*q_e_by_edge_cos
+q_e_by_edge_1 = q_e_by_edge_cos + q_e_by_edge_mean
+u112 = half_sqrt3*q_e_by_edge_sin
+q_e_by_edge_2 = q_e_by_edge_other + u112
+q_e_by_edge_3 = q_e_by_edge_other - u112
+edge_flap = c_edge_flap*pressure
+b_de = constants[31]
+edge_edge = c_edge_edge*pressure - b_de
+q_e1 = q_e_fixed_1 + e1*q_e_by_edge_1 + e1d*edge_edge + edge_flap*f1d + f1*q_e_by_flap_1 + f1d*gyro_1
+q_e2 = q_e_fixed_2 + e2*q_e_by_edge_2 + e2d*edge_edge + edge_flap*f2d + f2*q_e_by_flap_2 + f2d*gyro_2
+q_e3 = q_e_fixed_3 + e3*q_e_by_edge_3 + e3d*edge_edge + edge_flap*f3d + f3*q_e_by_flap_3 + f3d*gyro_3
+m_f_a_fixed_mean = k71_turned*tha_s_x - k72_turned*wha_s_x
+m_f_a_fixed_cos = b_fy_turned*tha_y + b_rfx_turned*wha_y + k74_turned*wha_z - k73_turned*tha_z
+m_f_a_fixed_sin = b_fy_turned*tha_z + b_rfx_turned*wha_z + k73_turned*tha_y - k74_turned*wha_y
+m_f_a_fixed_other = m_f_a_fixed_mean - (0.5)*m_f_a_fixed_cos
+m_f_a_fixed_1 = m_f_a_fixed_cos + m_f_a_fixed_mean
+u113 = half_sqrt3*m_f_a_fixed_sin
+m_f_a_fixed_2 = m_f_a_fixed_other + u113
+m_f_a_fixed_3 = m_f_a_fixed_other - u113
+m_f_a_by_flap_mean = -l131*tha_s_x
+m_f_a_by_flap_cos = -l132*tha_z
+m_f_a_by_flap_sin = l132*tha_y
+m_f_a_by_flap_other = m_f_a_by_flap_mean - (0.5)*m_f_a_by_flap_cos
+m_f_a_by_flap_1 = m_f_a_by_flap_cos + m_f_a_by_flap_mean
+u114 = half_sqrt3*m_f_a_by_flap_sin
+m_f_a_by_flap_2 = m_f_a_by_flap_other + u114
+m_f_a_by_flap_3 = m_f_a_by_flap_other - u114
+u115 = l133*tha_s_x
+u116 = l134*wha_s_x
+m_f_a_by_edge_mean = (-u115) - u116
+u117 = l135*tha_z
+u118 = l136*wha_z
+m_f_a_by_edge_cos = (-u117) - u118
+u119 = l135*tha_y
+u120 = l136*wha_y
+m_f_a_by_edge_sin = u119 + u120
+m_f_a_by_edge_other = m_f_a_by_edge_mean - (0.5)*m_f_a_by_edge_cos
+m_f_a_by_edge_1 = m_f_a_by_edge_cos + m_f_a_by_edge_mean
+u121 = half_sqrt3*m_f_a_by_edge_sin
+m_f_a_by_edge_2 = m_f_a_by_edge_other + u121
+m_f_a_by_edge_3 = m_f_a_by_edge_other - u121
+m_f1a = m_f_a_fixed_1 + e1*m_f_a_by_edge_1 + f1*m_f_a_by_flap_1
+m_f2a = m_f_a_fixed_2 + e2*m_f_a_by_edge_2 + f2*m_f_a_by_flap_2
+m_f3a = m_f_a_fixed_3 + e3*m_f_a_by_edge_3 + f3*m_f_a_by_flap_3
+m_e_a_fixed_mean = k95_turned*tha_s_x - k96_turned*wha_s_x
+m_e_a_fixed_cos = b_ey_turned*tha_y + b_rex_turned*wha_y + k98_turned*wha_z - k97_turned*tha_z
+m_e_a_fixed_sin = b_ey_turned*tha_z + b_rex_turned*wha_z + k97_turned*tha_y - k98_turned*wha_y
+m_e_a_fixed_other = m_e_a_fixed_mean - (0.5)*m_e_a_fixed_cos
+m_e_a_fixed_1 = m_e_a_fixed_cos + m_e_a_fixed_mean
+u122 = half_sqrt3*m_e_a_fixed_sin
+m_e_a_fixed_2 = m_e_a_fixed_other + u122
+m_e_a_fixed_3 = m_e_a_fixed_other - u122
+m_e_a_by_flap_mean = u116 - u115
+m_e_a_by_flap_cos = u118 - u117
+m_e_a_by_flap_sin = u119 - u120
+m_e_a_by_flap_other = m_e_a_by_flap_mean - (0.5)*m_e_a_by_flap_cos
+m_e_a_by_flap_1 = m_e_a_by_flap_cos + m_e_a_by_flap_mean
+u123 = half_sqrt3*m_e_a_by_flap_sin
+m_e_a_by_flap_2 = m_e_a_by_flap_other + u123
+m_e_a_by_flap_3 = m_e_a_by_flap_other - u123
+m_e_a_by_edge_mean = -l181*tha_s_x
+m_e_a_by_edge_cos = -l182*tha_z
+m_e_a_by_edge_sin = l182*tha_y
+m_e_a_by_edge_other = m_e_a_by_edge_mean - (0.5)*m_e_a_by_edge_cos
+m_e_a_by_edge_1 = m_e_a_by_edge_cos + m_e_a_by_edge_mean
+u124 = half_sqrt3*m_e_a_by_edge_sin
+m_e_a_by_edge_2 = m_e_a_by_edge_other + u124
+m_e_a_by_edge_3 = m_e_a_by_edge_other - u124
+m_e1a = m_e_a_fixed_1 + e1*m_e_a_by_edge_1 + f1*m_e_a_by_flap_1
+m_e2a = m_e_a_fixed_2 + e2*m_e_a_by_edge_2 + f2*m_e_a_by_flap_2
+m_e3a = m_e_a_fixed_3 + e3*m_e_a_by_edge_3 + f3*m_e_a_by_flap_3
+m_f_s_fixed_mean = k71_turned*ths_s_x - k72_turned*whs_s_x
+m_f_s_fixed_cos = b_fy_turned*ths_y + b_rfx_turned*whs_y + k74_turned*whs_z - k73_turned*ths_z
+m_f_s_fixed_sin = b_fy_turned*ths_z + b_rfx_turned*whs_z + k73_turned*ths_y - k74_turned*whs_y
+m_f_s_fixed_other = m_f_s_fixed_mean - (0.5)*m_f_s_fixed_cos
+m_f_s_fixed_1 = m_f_s_fixed_cos + m_f_s_fixed_mean
+u125 = half_sqrt3*m_f_s_fixed_sin
+m_f_s_fixed_2 = m_f_s_fixed_other + u125
+m_f_s_fixed_3 = m_f_s_fixed_other - u125
+m_f_s_by_flap_mean = -l131*ths_s_x
+m_f_s_by_flap_cos = -l132*ths_z
+m_f_s_by_flap_sin = l132*ths_y
+m_f_s_by_flap_other = m_f_s_by_flap_mean - (0.5)*m_f_s_by_flap_cos
+m_f_s_by_flap_1 = m_f_s_by_flap_cos + m_f_s_by_flap_mean
+u126 = half_sqrt3*m_f_s_by_flap_sin
+m_f_s_by_flap_2 = m_f_s_by_flap_other + u126
+m_f_s_by_flap_3 = m_f_s_by_flap_other - u126
+u127 = l133*ths_s_x
+u128 = l134*whs_s_x
+m_f_s_by_edge_mean = (-u127) - u128
+u129 = l135*ths_z
+u130 = l136*whs_z
+m_f_s_by_edge_cos = (-u129) - u130
+u131 = l135*ths_y
+u132 = l136*whs_y
+m_f_s_by_edge_sin = u131 + u132
+m_f_s_by_edge_other = m_f_s_by_edge_mean - (0.5)*m_f_s_by_edge_cos
+m_f_s_by_edge_1 = m_f_s_by_edge_cos + m_f_s_by_edge_mean
+u133 = half_sqrt3*m_f_s_by_edge_sin
+m_f_s_by_edge_2 = m_f_s_by_edge_other + u133
+m_f_s_by_edge_3 = m_f_s_by_edge_other - u133
+m_f1s = m_f_s_fixed_1 + e1*m_f_s_by_edge_1 + f1*m_f_s_by_flap_1
+m_f2s = m_f_s_fixed_2 + e2*m_f_s_by_edge_2 + f2*m_f_s_by_flap_2
+m_f3s = m_f_s_fixed_3 + e3*m_f_s_by_edge_3 + f3*m_f_s_by_flap_3
+m_e_s_fixed_mean = k95_turned*ths_s_x - k96_turned*whs_s_x
+m_e_s_fixed_cos = b_ey_turned*ths_y + b_rex_turned*whs_y + k98_turned*whs_z - k97_turned*ths_z
+m_e_s_fixed_sin = b_ey_turned*ths_z + b_rex_turned*whs_z + k97_turned*ths_y - k98_turned*whs_y
+m_e_s_fixed_other = m_e_s_fixed_mean - (0.5)*m_e_s_fixed_cos
+m_e_s_fixed_1 = m_e_s_fixed_cos + m_e_s_fixed_mean
+u134 = half_sqrt3*m_e_s_fixed_sin
+m_e_s_fixed_2 = m_e_s_fixed_other + u134
+m_e_s_fixed_3 = m_e_s_fixed_other - u134
+m_e_s_by_flap_mean = u128 - u127
+m_e_s_by_flap_cos = u130 - u129
+m_e_s_by_flap_sin = u131 - u132
+m_e_s_by_flap_other = m_e_s_by_flap_mean - (0.5)*m_e_s_by_flap_cos
+m_e_s_by_flap_1 = m_e_s_by_flap_cos + m_e_s_by_flap_mean
+u135 = half_sqrt3*m_e_s_by_flap_sin
+m_e_s_by_flap_2 = m_e_s_by_flap_other + u135
+m_e_s_by_flap_3 = m_e_s_by_flap_other - u135
+m_e_s_by_edge_mean = -l181*ths_s_x
+m_e_s_by_edge_cos = -l182*ths_z
+m_e_s_by_edge_sin = l182*ths_y
+m_e_s_by_edge_other = m_e_s_by_edge_mean - (0.5)*m_e_s_by_edge_cos
+m_e_s_by_edge_1 = m_e_s_by_edge_cos + m_e_s_by_edge_mean
+u136 = half_sqrt3*m_e_s_by_edge_sin
+m_e_s_by_edge_2 = m_e_s_by_edge_other + u136
+m_e_s_by_edge_3 = m_e_s_by_edge_other - u136
+m_e1s = m_e_s_fixed_1 + e1*m_e_s_by_edge_1 + f1*m_e_s_by_flap_1
+m_e2s = m_e_s_fixed_2 + e2*m_e_s_by_edge_2 + f2*m_e_s_by_flap_2
+m_e3s = m_e_s_fixed_3 + e3*m_e_s_by_edge_3 + f3*m_e_s_by_flap_3
+m_f_p_fixed_mean = -k72_turned
+m_f_p_by_edge_mean = -l134
+m_f1p = m_f_p_fixed_mean + e1*m_f_p_by_edge_mean
+m_f2p = m_f_p_fixed_mean + e2*m_f_p_by_edge_mean
+m_f3p = m_f_p_fixed_mean + e3*m_f_p_by_edge_mean
+m_e_p_fixed_mean = -k96_turned
+m_e1p = m_e_p_fixed_mean + f1*l134
+m_e2p = m_e_p_fixed_mean + f2*l134
+m_e3p = m_e_p_fixed_mean + f3*l134
+l204 = constants[532]
+own_p1 = m_e1p - l204*m_f1p
+own_p2 = m_e2p - l204*m_f2p
+own_p3 = m_e3p - l204*m_f3p
+own_a1 = m_e1a - l204*m_f1a
+own_a2 = m_e2a - l204*m_f2a
+own_a3 = m_e3a - l204*m_f3a
+own_s1 = m_e1s - l204*m_f1s
+own_s2 = m_e2s - l204*m_f2s
+own_s3 = m_e3s - l204*m_f3s
+own_q1 = q_e1 - l204*q_f1
+own_q2 = q_e2 - l204*q_f2
+own_q3 = q_e3 - l204*q_f3
+l205 = constants[533]
+l206 = constants[534]
+r_p = net_moment_x - torque_shaft - l205*(m_f1p*q_f1 + m_f2p*q_f2 + m_f3p*q_f3) - l206*(own_p1*own_q1 + own_p2*own_q2 + own_p3*own_q3)
+l118 = constants[446]
+s_pp = l118 + rih_xx - l205*((m_f1p*m_f1p) + (m_f2p*m_f2p) + (m_f3p*m_f3p)) - l206*((own_p1*own_p1) + (own_p2*own_p2) + (own_p3*own_p3))
+inv_p = (1.0/s_pp)
+l113 = constants[441]
+n_m = constants[48]
+t_da = constants[76]
+r_a = a*l113 + net_force_x*tha_s_x + net_force_y*tha_y + net_force_z*tha_z + net_moment_x*wha_s_x + net_moment_y*wha_y + net_moment_z*wha_z - ad*t_da - l205*(m_f1a*q_f1 + m_f2a*q_f2 + m_f3a*q_f3) - l206*(own_a1*own_q1 + own_a2*own_q2 + own_a3*own_q3) - n_m*(nac_acc_x*nac_ta_x + nac_acc_y*nac_ta_y + nac_acc_z*nac_ta_z) - nac_moment_y*wa_y - nac_moment_z*wa_z
+s_ap = ang_a_x - l205*(m_f1a*m_f1p + m_f2a*m_f2p + m_f3a*m_f3p) - l206*(own_a1*own_p1 + own_a2*own_p2 + own_a3*own_p3)
+l_ap = inv_p*s_ap
+t_maa = constants[62]
+s_aa = t_maa + ang_a_x*wha_s_x + ang_a_y*wha_y + ang_a_z*wha_z + mom_a_x*tha_s_x + mom_a_y*tha_y + mom_a_z*tha_z + n_iyy*(wa_y*wa_y) + n_izz*(wa_z*wa_z) + n_m*((nac_ta_x*nac_ta_x) + (nac_ta_y*nac_ta_y) + (nac_ta_z*nac_ta_z)) - l205*((m_f1a*m_f1a) + (m_f2a*m_f2a) + (m_f3a*m_f3a)) - l206*((own_a1*own_a1) + (own_a2*own_a2) + (own_a3*own_a3))
+inv_a = (1.0/(s_aa - l_ap*s_ap))
+z_a = r_a - l_ap*r_p
+l114 = constants[442]
+t_ds = constants[77]
+r_s = l114*s + nac_moment_x*t_slope_ss + net_force_x*ths_s_x + net_force_y*ths_y + net_force_z*ths_z + net_moment_x*whs_s_x + net_moment_y*whs_y + net_moment_z*whs_z - l205*(m_f1s*q_f1 + m_f2s*q_f2 + m_f3s*q_f3) - l206*(own_q1*own_s1 + own_q2*own_s2 + own_q3*own_s3) - n_m*(nac_acc_x*ts_x + nac_acc_y*nac_ts_y + nac_acc_z*nac_ts_z) - sd*t_ds
+s_sp = ang_s_x - l205*(m_f1p*m_f1s + m_f2p*m_f2s + m_f3p*m_f3s) - l206*(own_p1*own_s1 + own_p2*own_s2 + own_p3*own_s3)
+l_sp = inv_p*s_sp
+s_sa = ang_s_x*wha_s_x + ang_s_y*wha_y + ang_s_z*wha_z + mom_s_x*tha_s_x + mom_s_y*tha_y + mom_s_z*tha_z + n_m*(nac_ta_x*ts_x + nac_ta_y*nac_ts_y + nac_ta_z*nac_ts_z) - l205*(m_f1a*m_f1s + m_f2a*m_f2s + m_f3a*m_f3s) - l206*(own_a1*own_s1 + own_a2*own_s2 + own_a3*own_s3)
+v_sa = s_sa - l_sp*s_ap
+l_sa = inv_a*v_sa
+t_mss = constants[63]
+s_ss = t_mss + ang_s_x*whs_s_x + ang_s_y*whs_y + ang_s_z*whs_z + mom_s_x*ths_s_x + mom_s_y*ths_y + mom_s_z*ths_z + n_ixx*(t_slope_ss*t_slope_ss) + n_m*((nac_ts_y*nac_ts_y) + (nac_ts_z*nac_ts_z) + (ts_x*ts_x)) - l205*((m_f1s*m_f1s) + (m_f2s*m_f2s) + (m_f3s*m_f3s)) - l206*((own_s1*own_s1) + (own_s2*own_s2) + (own_s3*own_s3))
+inv_s = (1.0/(s_ss - l_sa*v_sa - l_sp*s_sp))
+z_s = r_s - l_sa*z_a - l_sp*r_p
+x_s = inv_s*z_s
+x_a = inv_a*z_a - l_sa*x_s
+x_p = inv_p*r_p - l_ap*x_a - l_sp*x_s
+x_e1 = l206*(own_q1 - own_a1*x_a - own_p1*x_p - own_s1*x_s)
+x_f1 = l205*(q_f1 - m_f1a*x_a - m_f1p*x_p - m_f1s*x_s) - l204*x_e1
+x_e2 = l206*(own_q2 - own_a2*x_a - own_p2*x_p - own_s2*x_s)
+x_f2 = l205*(q_f2 - m_f2a*x_a - m_f2p*x_p - m_f2s*x_s) - l204*x_e2
+x_e3 = l206*(own_q3 - own_a3*x_a - own_p3*x_p - own_s3*x_s)
+x_f3 = l205*(q_f3 - m_f3a*x_a - m_f3p*x_p - m_f3s*x_s) - l204*x_e3
+l207 = constants[535]
+l208 = constants[536]
+l209 = constants[537]
+x_gen = l208*(l207*torque_shaft - torque_commanded) + l209*x_p
+add = x_a
+sdd = x_s
+f1dd = x_f1
+f2dd = x_f2
+f3dd = x_f3
+e1dd = x_e1
+e2dd = x_e2
+e3dd = x_e3
+phidd = x_p
+gendd = x_gen
 hub_full_x = acc_f_s_x + add*tha_s_x + sdd*ths_s_x
 hub_full_y = acc_f_y + add*tha_y + sdd*ths_y
 hub_full_z = acc_f_z + add*tha_z + sdd*ths_z
-phidd = derivative[18]
 hub_fullspin_x = phidd + spin_f_s_x + add*wha_s_x + sdd*whs_s_x
 hub_fullspin_y = spin_h_y + add*wha_y + sdd*whs_y
 hub_fullspin_z = spin_h_z + add*wha_z + sdd*whs_z
 cos_cone = constants[39]
-u40 = cos_cone*wf_x
-sin_cone = constants[40]
-lw_c1_x = u40 - sin_cone*won_z
-u41 = sin_cone*wf_x
-lw_c1_z = u41 + cos_cone*won_z
-u42 = cos_cone*hub_full_x
-lg_c1_x = u42 - hub_full_z*sin_cone
-u43 = hub_full_x*sin_cone
-lg_c1_z = u43 + cos_cone*hub_full_z
-u44 = cos_cone*hub_fullspin_x
-lsp_c1_x = u44 - hub_fullspin_z*sin_cone
-u45 = hub_fullspin_x*sin_cone
-lsp_c1_z = u45 + cos_cone*hub_fullspin_z
-e1 = x[5]
-f1 = x[2]
+u137 = cos_cone*wf_x
+lw_c1_x = u137 - sin_cone*won_z
+u138 = sin_cone*wf_x
+lw_c1_z = u138 + cos_cone*won_z
+u139 = cos_cone*hub_full_x
+lg_c1_x = u139 - hub_full_z*sin_cone
+u140 = hub_full_x*sin_cone
+lg_c1_z = u140 + cos_cone*hub_full_z
+u141 = cos_cone*hub_fullspin_x
+lsp_c1_x = u141 - hub_fullspin_z*sin_cone
+u142 = hub_fullspin_x*sin_cone
+lsp_c1_z = u142 + cos_cone*hub_fullspin_z
 bs1_x = b_ex_turned*e1 + b_fx_turned*f1
 bs1_y = b_ey_turned*e1 + b_fy_turned*f1
 b_m1 = constants[1]
-u46 = -b_m1
-u47 = (e1*e1)
+u143 = -b_m1
 b_see = constants[23]
-u48 = (0.5)*b_see
-u49 = (f1*f1)
+u144 = (0.5)*b_see
 b_sff = constants[21]
-u50 = (0.5)*b_sff
+u145 = (0.5)*b_sff
 b_sfe = constants[22]
-u51 = b_sfe*f1
-bs1_z = (-u46) - e1*u51 - u47*u48 - u49*u50
-u52 = 2.0*e1
-u53 = b_fyey_turned*u52
-u54 = b_eyey_turned*u47 + b_fyfy_turned*u49 + f1*u53
-b_rsfe = constants[25]
-u55 = b_rsfe*u52
+bs1_z = (-u143) - b_sfe*u50 - u144*u53 - u145*u41
+u146 = 2.0*u50
+u147 = b_eyey_turned*u53 + b_fyey_turned*u146 + b_fyfy_turned*u41
 b_m2 = constants[2]
 b_rsee = constants[26]
+b_rsfe = constants[25]
 b_rsff = constants[24]
-u56 = b_m2 - b_rsee*u47 - b_rsff*u49 - f1*u55
-bi1_xx = u54 + u56
-u57 = b_fxey_turned + b_fyex_turned
-u58 = f1*u57
-bi1_xy = (-b_exey_turned*u47) - b_fxfy_turned*u49 - e1*u58
+u148 = b_m2 - b_rsee*u53 - b_rsfe*u146 - b_rsff*u41
+bi1_xx = u147 + u148
+u149 = b_fxey_turned + b_fyex_turned
+bi1_xy = (-b_exey_turned*u53) - b_fxfy_turned*u41 - u149*u50
 bi1_xz = (-b_rex_turned*e1) - b_rfx_turned*f1
-u59 = b_fxex_turned*u52
-u60 = b_exex_turned*u47 + b_fxfx_turned*u49 + f1*u59
-bi1_yy = u56 + u60
+u150 = b_exex_turned*u53 + b_fxex_turned*u146 + b_fxfx_turned*u41
+bi1_yy = u148 + u150
 bi1_yz = (-b_rey_turned*e1) - b_rfy_turned*f1
-bi1_zz = u54 + u60
-u61 = 2.0*f1
-u62 = (-b_rsee*u52) - b_rsfe*u61
-u63 = b_eyey_turned*u52 + b_fyey_turned*u61
-u64 = (-u55) - b_rsff*u61
-u65 = u53 + b_fyfy_turned*u61
-bid1_xx = e1d*(u62 + u63) + f1d*(u64 + u65)
-bid1_xy = e1d*((-u58) - b_exey_turned*u52) + f1d*((-b_fxfy_turned*u61) - e1*u57)
-u66 = b_rex_turned*e1d + b_rfx_turned*f1d
-bid1_xz = -u66
-u67 = b_exex_turned*u52 + b_fxex_turned*u61
-u68 = u59 + b_fxfx_turned*u61
-bid1_yy = e1d*(u62 + u67) + f1d*(u64 + u68)
-u69 = b_rey_turned*e1d
-u70 = b_rfy_turned*f1d
-bid1_yz = (-u69) - u70
-bid1_zz = e1d*(u63 + u67) + f1d*(u65 + u68)
-u71 = 2.0*e1d
-u72 = 2.0*f1d
-blade1_whirl_x = b_ex_turned*u71 + b_fx_turned*u72 + bs1_z*won_y - bs1_y*lw_c1_z
-blade1_whirl_y = b_ey_turned*u71 + b_fy_turned*u72 + bs1_x*lw_c1_z - bs1_z*lw_c1_x
-u73 = (-u51) - b_see*e1
-u74 = (-b_sfe*e1) - b_sff*f1
-blade1_whirl_z = bs1_y*lw_c1_x + u71*u73 + u72*u74 - bs1_x*won_y
-blade1_momentum_x = bi1_xx*lw_c1_x + bi1_xy*won_y + bi1_xz*lw_c1_z - u69 - u70
-blade1_momentum_y = u66 + bi1_xy*lw_c1_x + bi1_yy*won_y + bi1_yz*lw_c1_z
-u75 = b_fyex_turned - b_fxey_turned
-u76 = e1*u75
-blade1_momentum_z = bi1_xz*lw_c1_x + bi1_yz*won_y + bi1_zz*lw_c1_z + f1d*u76 - e1d*f1*u75
+bi1_zz = u147 + u150
+u151 = (-b_rsee*u62) - b_rsfe*u44
+u152 = b_eyey_turned*u62 + b_fyey_turned*u44
+u153 = (-b_rsfe*u62) - b_rsff*u44
+u154 = b_fyey_turned*u62 + b_fyfy_turned*u44
+bid1_xx = e1d*(u151 + u152) + f1d*(u153 + u154)
+bid1_xy = e1d*((-b_exey_turned*u62) - f1*u149) + f1d*((-b_fxfy_turned*u44) - e1*u149)
+u155 = b_rex_turned*e1d + b_rfx_turned*f1d
+bid1_xz = -u155
+u156 = b_exex_turned*u62 + b_fxex_turned*u44
+u157 = b_fxex_turned*u62 + b_fxfx_turned*u44
+bid1_yy = e1d*(u151 + u156) + f1d*(u153 + u157)
+u158 = b_rey_turned*e1d
+u159 = b_rfy_turned*f1d
+bid1_yz = (-u158) - u159
+bid1_zz = e1d*(u152 + u156) + f1d*(u154 + u157)
+u160 = 2.0*e1d
+u161 = 2.0*f1d
+blade1_whirl_x = b_ex_turned*u160 + b_fx_turned*u161 + bs1_z*won_y - bs1_y*lw_c1_z
+blade1_whirl_y = b_ey_turned*u160 + b_fy_turned*u161 + bs1_x*lw_c1_z - bs1_z*lw_c1_x
+u162 = (-b_see*e1) - b_sfe*f1
+u163 = (-b_sfe*e1) - b_sff*f1
+blade1_whirl_z = bs1_y*lw_c1_x + u160*u162 + u161*u163 - bs1_x*won_y
+blade1_momentum_x = bi1_xx*lw_c1_x + bi1_xy*won_y + bi1_xz*lw_c1_z - u158 - u159
+blade1_momentum_y = u155 + bi1_xy*lw_c1_x + bi1_yy*won_y + bi1_yz*lw_c1_z
+u164 = b_fyex_turned - b_fxey_turned
+blade1_momentum_z = bi1_xz*lw_c1_x + bi1_yz*won_y + bi1_zz*lw_c1_z + u164*u56 - u164*u57
 b_m = constants[0]
 blade1_force_x = b_m*lg_c1_x + blade1_whirl_z*won_y + bs1_z*hub_fullspin_y - blade1_whirl_y*lw_c1_z - bs1_y*lsp_c1_z
 blade1_force_y = b_m*hub_full_y + blade1_whirl_x*lw_c1_z + bs1_x*lsp_c1_z - blade1_whirl_z*lw_c1_x - bs1_z*lsp_c1_x
-blade1_force_z = b_m*lg_c1_z + blade1_whirl_y*lw_c1_x + bs1_y*lsp_c1_x - b_see*(e1d*e1d) - b_sfe*f1d*u71 - b_sff*(f1d*f1d) - blade1_whirl_x*won_y - bs1_x*hub_fullspin_y
+u165 = 2.0*b_sfe
+blade1_force_z = b_m*lg_c1_z + blade1_whirl_y*lw_c1_x + bs1_y*lsp_c1_x - b_see*u68 - b_sff*u47 - blade1_whirl_x*won_y - bs1_x*hub_fullspin_y - u165*u65
 blade1_moment_x = bi1_xx*lsp_c1_x + bi1_xy*hub_fullspin_y + bi1_xz*lsp_c1_z + bid1_xx*lw_c1_x + bid1_xy*won_y + bid1_xz*lw_c1_z + blade1_momentum_z*won_y + bs1_y*lg_c1_z - blade1_momentum_y*lw_c1_z - bs1_z*hub_full_y
 blade1_moment_y = bi1_xy*lsp_c1_x + bi1_yy*hub_fullspin_y + bi1_yz*lsp_c1_z + bid1_xy*lw_c1_x + bid1_yy*won_y + bid1_yz*lw_c1_z + blade1_momentum_x*lw_c1_z + bs1_z*lg_c1_x - blade1_momentum_z*lw_c1_x - bs1_x*lg_c1_z
 blade1_moment_z = bi1_xz*lsp_c1_x + bi1_yz*hub_fullspin_y + bi1_zz*lsp_c1_z + bid1_xz*lw_c1_x + bid1_yz*won_y + bid1_zz*lw_c1_z + blade1_momentum_y*lw_c1_x + bs1_x*hub_full_y - blade1_momentum_x*won_y - bs1_y*lg_c1_x
-u77 = c_thrust*relative_x
-u78 = uniform_cos + uniform_mean
-e1dd = derivative[15]
-f1dd = derivative[12]
-blade1_net_x = pressure*(u77 + c_thrust_edge*e1d + c_thrust_flap*f1d + c_thrust_kappa*kappa_cos + c_thrust_skew*skew_cos + c_thrust_w*u78 + c_thrust_y*relative_y) - blade1_force_x - b_ex_turned*e1dd - b_fx_turned*f1dd
-u79 = c_tangential*relative_x
-blade1_net_y = pressure*((-u79) - c_tangential_edge*e1d - c_tangential_flap*f1d - c_tangential_kappa*kappa_cos - c_tangential_skew*skew_cos - c_tangential_w*u78 - c_tangential_y*relative_y) - blade1_force_y - b_ey_turned*e1dd - b_fy_turned*f1dd
-blade1_net_z = (-blade1_force_z) - e1dd*u73 - f1dd*u74
-u80 = c_torque*relative_x
-u81 = pressure*radius
-blade1_netm_x = b_rey_turned*e1dd + b_rfy_turned*f1dd + u81*(u80 + c_torque_edge*e1d + c_torque_flap*f1d + c_torque_kappa*kappa_cos + c_torque_skew*skew_cos + c_torque_w*u78 + c_torque_y*relative_y) - blade1_moment_x
-u82 = c_bending*relative_x
-blade1_netm_y = pressure*radius*(u82 + c_bending_edge*e1d + c_bending_flap*f1d + c_bending_kappa*kappa_cos + c_bending_skew*skew_cos + c_bending_w*u78 + c_bending_y*relative_y) - blade1_moment_y - b_rex_turned*e1dd - b_rfx_turned*f1dd
-blade1_netm_z = e1dd*f1*u75 - blade1_moment_z - f1dd*u76
-u83 = (0.5)*won_y
-half_sqrt3 = 0.8660254037844386
-u84 = half_sqrt3*won_z
-lw_2_y = u84 - u83
-u85 = (0.5)*won_z
-u86 = half_sqrt3*won_y
-lw_2_z = (-u85) - u86
-lw_c2_x = u40 - lw_2_z*sin_cone
-lw_c2_z = u41 + cos_cone*lw_2_z
-u87 = (0.5)*hub_full_y
-u88 = half_sqrt3*hub_full_z
-lg_2_y = u88 - u87
-u89 = (0.5)*hub_full_z
-u90 = half_sqrt3*hub_full_y
-lg_2_z = (-u89) - u90
-lg_c2_x = u42 - lg_2_z*sin_cone
-lg_c2_z = u43 + cos_cone*lg_2_z
-u91 = (0.5)*hub_fullspin_y
-u92 = half_sqrt3*hub_fullspin_z
-lsp_2_y = u92 - u91
-u93 = (0.5)*hub_fullspin_z
-u94 = half_sqrt3*hub_fullspin_y
-lsp_2_z = (-u93) - u94
-lsp_c2_x = u44 - lsp_2_z*sin_cone
-lsp_c2_z = u45 + cos_cone*lsp_2_z
-e2 = x[6]
-f2 = x[3]
+u166 = uniform_cos + uniform_mean
+blade1_net_x = pressure*(u90 + u92 + c_thrust_edge*e1d + c_thrust_flap*f1d + c_thrust_w*u166) - blade1_force_x - b_ex_turned*e1dd - b_fx_turned*f1dd
+u167 = c_tangential*relative_x
+blade1_net_y = pressure*((-u167) - u91 - c_tangential_edge*e1d - c_tangential_flap*f1d - c_tangential_w*u166) - blade1_force_y - b_ey_turned*e1dd - b_fy_turned*f1dd
+blade1_net_z = (-blade1_force_z) - e1dd*u162 - f1dd*u163
+u168 = pressure*radius
+blade1_netm_x = b_rey_turned*e1dd + b_rfy_turned*f1dd + u168*(u93 + u95 + c_torque_edge*e1d + c_torque_flap*f1d + c_torque_w*u166) - blade1_moment_x
+u169 = c_bending*relative_x
+blade1_netm_y = pressure*radius*(u169 + u94 + c_bending_edge*e1d + c_bending_flap*f1d + c_bending_w*u166) - blade1_moment_y - b_rex_turned*e1dd - b_rfx_turned*f1dd
+blade1_netm_z = e1dd*f1*u164 - blade1_moment_z - e1*f1dd*u164
+u170 = (0.5)*won_y
+u171 = half_sqrt3*won_z
+lw_2_y = u171 - u170
+u172 = (0.5)*won_z
+u173 = half_sqrt3*won_y
+lw_2_z = (-u172) - u173
+lw_c2_x = u137 - lw_2_z*sin_cone
+lw_c2_z = u138 + cos_cone*lw_2_z
+u174 = (0.5)*hub_full_y
+u175 = half_sqrt3*hub_full_z
+lg_2_y = u175 - u174
+u176 = (0.5)*hub_full_z
+u177 = half_sqrt3*hub_full_y
+lg_2_z = (-u176) - u177
+lg_c2_x = u139 - lg_2_z*sin_cone
+lg_c2_z = u140 + cos_cone*lg_2_z
+u178 = (0.5)*hub_fullspin_y
+u179 = half_sqrt3*hub_fullspin_z
+lsp_2_y = u179 - u178
+u180 = (0.5)*hub_fullspin_z
+u181 = half_sqrt3*hub_fullspin_y
+lsp_2_z = (-u180) - u181
+lsp_c2_x = u141 - lsp_2_z*sin_cone
+lsp_c2_z = u142 + cos_cone*lsp_2_z
 bs2_x = b_ex_turned*e2 + b_fx_turned*f2
 bs2_y = b_ey_turned*e2 + b_fy_turned*f2
-u95 = (e2*e2)
-u96 = (f2*f2)
-u97 = b_sfe*f2
-bs2_z = (-u46) - e2*u97 - u48*u95 - u50*u96
-u98 = 2.0*e2
-u99 = b_fyey_turned*u98
-u100 = b_eyey_turned*u95 + b_fyfy_turned*u96 + f2*u99
-u101 = b_rsfe*u98
-u102 = b_m2 - b_rsee*u95 - b_rsff*u96 - f2*u101
-bi2_xx = u100 + u102
-u103 = f2*u57
-bi2_xy = (-b_exey_turned*u95) - b_fxfy_turned*u96 - e2*u103
+bs2_z = (-u143) - b_sfe*u51 - u144*u54 - u145*u42
+u182 = 2.0*u51
+u183 = b_eyey_turned*u54 + b_fyey_turned*u182 + b_fyfy_turned*u42
+u184 = b_m2 - b_rsee*u54 - b_rsfe*u182 - b_rsff*u42
+bi2_xx = u183 + u184
+bi2_xy = (-b_exey_turned*u54) - b_fxfy_turned*u42 - u149*u51
 bi2_xz = (-b_rex_turned*e2) - b_rfx_turned*f2
-u104 = b_fxex_turned*u98
-u105 = b_exex_turned*u95 + b_fxfx_turned*u96 + f2*u104
-bi2_yy = u102 + u105
+u185 = b_exex_turned*u54 + b_fxex_turned*u182 + b_fxfx_turned*u42
+bi2_yy = u184 + u185
 bi2_yz = (-b_rey_turned*e2) - b_rfy_turned*f2
-bi2_zz = u100 + u105
-u106 = 2.0*f2
-u107 = (-b_rsee*u98) - b_rsfe*u106
-u108 = b_eyey_turned*u98 + b_fyey_turned*u106
-u109 = (-u101) - b_rsff*u106
-u110 = u99 + b_fyfy_turned*u106
-bid2_xx = e2d*(u107 + u108) + f2d*(u109 + u110)
-bid2_xy = e2d*((-u103) - b_exey_turned*u98) + f2d*((-b_fxfy_turned*u106) - e2*u57)
-u111 = b_rex_turned*e2d + b_rfx_turned*f2d
-bid2_xz = -u111
-u112 = b_exex_turned*u98 + b_fxex_turned*u106
-u113 = u104 + b_fxfx_turned*u106
-bid2_yy = e2d*(u107 + u112) + f2d*(u109 + u113)
-u114 = b_rey_turned*e2d
-u115 = b_rfy_turned*f2d
-bid2_yz = (-u114) - u115
-bid2_zz = e2d*(u108 + u112) + f2d*(u110 + u113)
-u116 = 2.0*e2d
-u117 = 2.0*f2d
-blade2_whirl_x = b_ex_turned*u116 + b_fx_turned*u117 + bs2_z*lw_2_y - bs2_y*lw_c2_z
-blade2_whirl_y = b_ey_turned*u116 + b_fy_turned*u117 + bs2_x*lw_c2_z - bs2_z*lw_c2_x
-u118 = (-u97) - b_see*e2
-u119 = (-b_sfe*e2) - b_sff*f2
-blade2_whirl_z = bs2_y*lw_c2_x + u116*u118 + u117*u119 - bs2_x*lw_2_y
-blade2_momentum_x = bi2_xx*lw_c2_x + bi2_xy*lw_2_y + bi2_xz*lw_c2_z - u114 - u115
-blade2_momentum_y = u111 + bi2_xy*lw_c2_x + bi2_yy*lw_2_y + bi2_yz*lw_c2_z
-u120 = e2*u75
-blade2_momentum_z = bi2_xz*lw_c2_x + bi2_yz*lw_2_y + bi2_zz*lw_c2_z + f2d*u120 - e2d*f2*u75
+bi2_zz = u183 + u185
+u186 = (-b_rsee*u63) - b_rsfe*u45
+u187 = b_eyey_turned*u63 + b_fyey_turned*u45
+u188 = (-b_rsfe*u63) - b_rsff*u45
+u189 = b_fyey_turned*u63 + b_fyfy_turned*u45
+bid2_xx = e2d*(u186 + u187) + f2d*(u188 + u189)
+bid2_xy = e2d*((-b_exey_turned*u63) - f2*u149) + f2d*((-b_fxfy_turned*u45) - e2*u149)
+u190 = b_rex_turned*e2d + b_rfx_turned*f2d
+bid2_xz = -u190
+u191 = b_exex_turned*u63 + b_fxex_turned*u45
+u192 = b_fxex_turned*u63 + b_fxfx_turned*u45
+bid2_yy = e2d*(u186 + u191) + f2d*(u188 + u192)
+u193 = b_rey_turned*e2d
+u194 = b_rfy_turned*f2d
+bid2_yz = (-u193) - u194
+bid2_zz = e2d*(u187 + u191) + f2d*(u189 + u192)
+u195 = 2.0*e2d
+u196 = 2.0*f2d
+blade2_whirl_x = b_ex_turned*u195 + b_fx_turned*u196 + bs2_z*lw_2_y - bs2_y*lw_c2_z
+blade2_whirl_y = b_ey_turned*u195 + b_fy_turned*u196 + bs2_x*lw_c2_z - bs2_z*lw_c2_x
+u197 = (-b_see*e2) - b_sfe*f2
+u198 = (-b_sfe*e2) - b_sff*f2
+blade2_whirl_z = bs2_y*lw_c2_x + u195*u197 + u196*u198 - bs2_x*lw_2_y
+blade2_momentum_x = bi2_xx*lw_c2_x + bi2_xy*lw_2_y + bi2_xz*lw_c2_z - u193 - u194
+blade2_momentum_y = u190 + bi2_xy*lw_c2_x + bi2_yy*lw_2_y + bi2_yz*lw_c2_z
+blade2_momentum_z = bi2_xz*lw_c2_x + bi2_yz*lw_2_y + bi2_zz*lw_c2_z + u164*u58 - u164*u59
 blade2_force_x = b_m*lg_c2_x + blade2_whirl_z*lw_2_y + bs2_z*lsp_2_y - blade2_whirl_y*lw_c2_z - bs2_y*lsp_c2_z
 blade2_force_y = b_m*lg_2_y + blade2_whirl_x*lw_c2_z + bs2_x*lsp_c2_z - blade2_whirl_z*lw_c2_x - bs2_z*lsp_c2_x
-blade2_force_z = b_m*lg_c2_z + blade2_whirl_y*lw_c2_x + bs2_y*lsp_c2_x - b_see*(e2d*e2d) - b_sfe*f2d*u116 - b_sff*(f2d*f2d) - blade2_whirl_x*lw_2_y - bs2_x*lsp_2_y
+blade2_force_z = b_m*lg_c2_z + blade2_whirl_y*lw_c2_x + bs2_y*lsp_c2_x - b_see*u69 - b_sff*u48 - blade2_whirl_x*lw_2_y - bs2_x*lsp_2_y - u165*u66
 blade2_moment_x = bi2_xx*lsp_c2_x + bi2_xy*lsp_2_y + bi2_xz*lsp_c2_z + bid2_xx*lw_c2_x + bid2_xy*lw_2_y + bid2_xz*lw_c2_z + blade2_momentum_z*lw_2_y + bs2_y*lg_c2_z - blade2_momentum_y*lw_c2_z - bs2_z*lg_2_y
 blade2_moment_y = bi2_xy*lsp_c2_x + bi2_yy*lsp_2_y + bi2_yz*lsp_c2_z + bid2_xy*lw_c2_x + bid2_yy*lw_2_y + bid2_yz*lw_c2_z + blade2_momentum_x*lw_c2_z + bs2_z*lg_c2_x - blade2_momentum_z*lw_c2_x - bs2_x*lg_c2_z
 blade2_moment_z = bi2_xz*lsp_c2_x + bi2_yz*lsp_2_y + bi2_zz*lsp_c2_z + bid2_xz*lw_c2_x + bid2_yz*lw_2_y + bid2_zz*lw_c2_z + blade2_momentum_y*lw_c2_x + bs2_x*lg_2_y - blade2_momentum_x*lw_2_y - bs2_y*lg_c2_x
-u121 = (0.5)*kappa_cos
-u122 = half_sqrt3*kappa_sin
-u123 = u122 - u121
-u124 = (0.5)*skew_cos
-u125 = half_sqrt3*skew_sin
-u126 = u125 - u124
-u127 = (0.5)*uniform_cos
-u128 = half_sqrt3*uniform_sin
-u129 = u128 + uniform_mean - u127
-u130 = (0.5)*relative_y
-u131 = half_sqrt3*relative_z
-u132 = u131 - u130
-e2dd = derivative[16]
-f2dd = derivative[13]
-blade2_net_x = pressure*(u77 + c_thrust_edge*e2d + c_thrust_flap*f2d + c_thrust_kappa*u123 + c_thrust_skew*u126 + c_thrust_w*u129 + c_thrust_y*u132) - blade2_force_x - b_ex_turned*e2dd - b_fx_turned*f2dd
-blade2_net_y = pressure*((-u79) - c_tangential_edge*e2d - c_tangential_flap*f2d - c_tangential_kappa*u123 - c_tangential_skew*u126 - c_tangential_w*u129 - c_tangential_y*u132) - blade2_force_y - b_ey_turned*e2dd - b_fy_turned*f2dd
-blade2_net_z = (-blade2_force_z) - e2dd*u118 - f2dd*u119
-blade2_netm_x = b_rey_turned*e2dd + b_rfy_turned*f2dd + u81*(u80 + c_torque_edge*e2d + c_torque_flap*f2d + c_torque_kappa*u123 + c_torque_skew*u126 + c_torque_w*u129 + c_torque_y*u132) - blade2_moment_x
-blade2_netm_y = pressure*radius*(u82 + c_bending_edge*e2d + c_bending_flap*f2d + c_bending_kappa*u123 + c_bending_skew*u126 + c_bending_w*u129 + c_bending_y*u132) - blade2_moment_y - b_rex_turned*e2dd - b_rfx_turned*f2dd
-blade2_netm_z = e2dd*f2*u75 - blade2_moment_z - f2dd*u120
-lw_3_y = (-u83) - u84
-lw_3_z = u86 - u85
-lw_c3_x = u40 - lw_3_z*sin_cone
-lw_c3_z = u41 + cos_cone*lw_3_z
-lg_3_y = (-u87) - u88
-lg_3_z = u90 - u89
-lg_c3_x = u42 - lg_3_z*sin_cone
-lg_c3_z = u43 + cos_cone*lg_3_z
-lsp_3_y = (-u91) - u92
-lsp_3_z = u94 - u93
-lsp_c3_x = u44 - lsp_3_z*sin_cone
-lsp_c3_z = u45 + cos_cone*lsp_3_z
-e3 = x[7]
-f3 = x[4]
+u199 = (0.5)*kappa_cos
+u200 = half_sqrt3*kappa_sin
+u201 = u200 - u199
+u202 = (0.5)*skew_cos
+u203 = half_sqrt3*skew_sin
+u204 = u203 - u202
+u205 = (0.5)*uniform_cos
+u206 = half_sqrt3*uniform_sin
+u207 = u206 + uniform_mean - u205
+u208 = (0.5)*relative_y
+u209 = half_sqrt3*relative_z
+u210 = u209 - u208
+blade2_net_x = pressure*(u90 + c_thrust_edge*e2d + c_thrust_flap*f2d + c_thrust_kappa*u201 + c_thrust_skew*u204 + c_thrust_w*u207 + c_thrust_y*u210) - blade2_force_x - b_ex_turned*e2dd - b_fx_turned*f2dd
+blade2_net_y = pressure*((-u167) - c_tangential_edge*e2d - c_tangential_flap*f2d - c_tangential_kappa*u201 - c_tangential_skew*u204 - c_tangential_w*u207 - c_tangential_y*u210) - blade2_force_y - b_ey_turned*e2dd - b_fy_turned*f2dd
+blade2_net_z = (-blade2_force_z) - e2dd*u197 - f2dd*u198
+blade2_netm_x = b_rey_turned*e2dd + b_rfy_turned*f2dd + u168*(u93 + c_torque_edge*e2d + c_torque_flap*f2d + c_torque_kappa*u201 + c_torque_skew*u204 + c_torque_w*u207 + c_torque_y*u210) - blade2_moment_x
+blade2_netm_y = pressure*radius*(u169 + c_bending_edge*e2d + c_bending_flap*f2d + c_bending_kappa*u201 + c_bending_skew*u204 + c_bending_w*u207 + c_bending_y*u210) - blade2_moment_y - b_rex_turned*e2dd - b_rfx_turned*f2dd
+blade2_netm_z = e2dd*f2*u164 - blade2_moment_z - e2*f2dd*u164
+lw_3_y = (-u170) - u171
+lw_3_z = u173 - u172
+lw_c3_x = u137 - lw_3_z*sin_cone
+lw_c3_z = u138 + cos_cone*lw_3_z
+lg_3_y = (-u174) - u175
+lg_3_z = u177 - u176
+lg_c3_x = u139 - lg_3_z*sin_cone
+lg_c3_z = u140 + cos_cone*lg_3_z
+lsp_3_y = (-u178) - u179
+lsp_3_z = u181 - u180
+lsp_c3_x = u141 - lsp_3_z*sin_cone
+lsp_c3_z = u142 + cos_cone*lsp_3_z
 bs3_x = b_ex_turned*e3 + b_fx_turned*f3
 bs3_y = b_ey_turned*e3 + b_fy_turned*f3
-u133 = (e3*e3)
-u134 = (f3*f3)
-u135 = b_sfe*f3
-bs3_z = (-u46) - e3*u135 - u133*u48 - u134*u50
-u136 = 2.0*e3
-u137 = b_fyey_turned*u136
-u138 = b_eyey_turned*u133 + b_fyfy_turned*u134 + f3*u137
-u139 = b_rsfe*u136
-u140 = b_m2 - b_rsee*u133 - b_rsff*u134 - f3*u139
-bi3_xx = u138 + u140
-u141 = f3*u57
-bi3_xy = (-b_exey_turned*u133) - b_fxfy_turned*u134 - e3*u141
+bs3_z = (-u143) - b_sfe*u52 - u144*u55 - u145*u43
+u211 = 2.0*u52
+u212 = b_eyey_turned*u55 + b_fyey_turned*u211 + b_fyfy_turned*u43
+u213 = b_m2 - b_rsee*u55 - b_rsfe*u211 - b_rsff*u43
+bi3_xx = u212 + u213
+bi3_xy = (-b_exey_turned*u55) - b_fxfy_turned*u43 - u149*u52
 bi3_xz = (-b_rex_turned*e3) - b_rfx_turned*f3
-u142 = b_fxex_turned*u136
-u143 = b_exex_turned*u133 + b_fxfx_turned*u134 + f3*u142
-bi3_yy = u140 + u143
+u214 = b_exex_turned*u55 + b_fxex_turned*u211 + b_fxfx_turned*u43
+bi3_yy = u213 + u214
 bi3_yz = (-b_rey_turned*e3) - b_rfy_turned*f3
-bi3_zz = u138 + u143
-u144 = 2.0*f3
-u145 = (-b_rsee*u136) - b_rsfe*u144
-u146 = b_eyey_turned*u136 + b_fyey_turned*u144
-u147 = (-u139) - b_rsff*u144
-u148 = u137 + b_fyfy_turned*u144
-bid3_xx = e3d*(u145 + u146) + f3d*(u147 + u148)
-bid3_xy = e3d*((-u141) - b_exey_turned*u136) + f3d*((-b_fxfy_turned*u144) - e3*u57)
-u149 = b_rex_turned*e3d + b_rfx_turned*f3d
-bid3_xz = -u149
-u150 = b_exex_turned*u136 + b_fxex_turned*u144
-u151 = u142 + b_fxfx_turned*u144
-bid3_yy = e3d*(u145 + u150) + f3d*(u147 + u151)
-u152 = b_rey_turned*e3d
-u153 = b_rfy_turned*f3d
-bid3_yz = (-u152) - u153
-bid3_zz = e3d*(u146 + u150) + f3d*(u148 + u151)
-u154 = 2.0*e3d
-u155 = 2.0*f3d
-blade3_whirl_x = b_ex_turned*u154 + b_fx_turned*u155 + bs3_z*lw_3_y - bs3_y*lw_c3_z
-blade3_whirl_y = b_ey_turned*u154 + b_fy_turned*u155 + bs3_x*lw_c3_z - bs3_z*lw_c3_x
-u156 = (-u135) - b_see*e3
-u157 = (-b_sfe*e3) - b_sff*f3
-blade3_whirl_z = bs3_y*lw_c3_x + u154*u156 + u155*u157 - bs3_x*lw_3_y
-blade3_momentum_x = bi3_xx*lw_c3_x + bi3_xy*lw_3_y + bi3_xz*lw_c3_z - u152 - u153
-blade3_momentum_y = u149 + bi3_xy*lw_c3_x + bi3_yy*lw_3_y + bi3_yz*lw_c3_z
-u158 = e3*u75
-blade3_momentum_z = bi3_xz*lw_c3_x + bi3_yz*lw_3_y + bi3_zz*lw_c3_z + f3d*u158 - e3d*f3*u75
+bi3_zz = u212 + u214
+u215 = (-b_rsee*u64) - b_rsfe*u46
+u216 = b_eyey_turned*u64 + b_fyey_turned*u46
+u217 = (-b_rsfe*u64) - b_rsff*u46
+u218 = b_fyey_turned*u64 + b_fyfy_turned*u46
+bid3_xx = e3d*(u215 + u216) + f3d*(u217 + u218)
+bid3_xy = e3d*((-b_exey_turned*u64) - f3*u149) + f3d*((-b_fxfy_turned*u46) - e3*u149)
+u219 = b_rex_turned*e3d + b_rfx_turned*f3d
+bid3_xz = -u219
+u220 = b_exex_turned*u64 + b_fxex_turned*u46
+u221 = b_fxex_turned*u64 + b_fxfx_turned*u46
+bid3_yy = e3d*(u215 + u220) + f3d*(u217 + u221)
+u222 = b_rey_turned*e3d
+u223 = b_rfy_turned*f3d
+bid3_yz = (-u222) - u223
+bid3_zz = e3d*(u216 + u220) + f3d*(u218 + u221)
+u224 = 2.0*e3d
+u225 = 2.0*f3d
+blade3_whirl_x = b_ex_turned*u224 + b_fx_turned*u225 + bs3_z*lw_3_y - bs3_y*lw_c3_z
+blade3_whirl_y = b_ey_turned*u224 + b_fy_turned*u225 + bs3_x*lw_c3_z - bs3_z*lw_c3_x
+u226 = (-b_see*e3) - b_sfe*f3
+u227 = (-b_sfe*e3) - b_sff*f3
+blade3_whirl_z = bs3_y*lw_c3_x + u224*u226 + u225*u227 - bs3_x*lw_3_y
+blade3_momentum_x = bi3_xx*lw_c3_x + bi3_xy*lw_3_y + bi3_xz*lw_c3_z - u222 - u223
+blade3_momentum_y = u219 + bi3_xy*lw_c3_x + bi3_yy*lw_3_y + bi3_yz*lw_c3_z
+blade3_momentum_z = bi3_xz*lw_c3_x + bi3_yz*lw_3_y + bi3_zz*lw_c3_z + u164*u60 - u164*u61
 blade3_force_x = b_m*lg_c3_x + blade3_whirl_z*lw_3_y + bs3_z*lsp_3_y - blade3_whirl_y*lw_c3_z - bs3_y*lsp_c3_z
 blade3_force_y = b_m*lg_3_y + blade3_whirl_x*lw_c3_z + bs3_x*lsp_c3_z - blade3_whirl_z*lw_c3_x - bs3_z*lsp_c3_x
-blade3_force_z = b_m*lg_c3_z + blade3_whirl_y*lw_c3_x + bs3_y*lsp_c3_x - b_see*(e3d*e3d) - b_sfe*f3d*u154 - b_sff*(f3d*f3d) - blade3_whirl_x*lw_3_y - bs3_x*lsp_3_y
+blade3_force_z = b_m*lg_c3_z + blade3_whirl_y*lw_c3_x + bs3_y*lsp_c3_x - b_see*u70 - b_sff*u49 - blade3_whirl_x*lw_3_y - bs3_x*lsp_3_y - u165*u67
 blade3_moment_x = bi3_xx*lsp_c3_x + bi3_xy*lsp_3_y + bi3_xz*lsp_c3_z + bid3_xx*lw_c3_x + bid3_xy*lw_3_y + bid3_xz*lw_c3_z + blade3_momentum_z*lw_3_y + bs3_y*lg_c3_z - blade3_momentum_y*lw_c3_z - bs3_z*lg_3_y
 blade3_moment_y = bi3_xy*lsp_c3_x + bi3_yy*lsp_3_y + bi3_yz*lsp_c3_z + bid3_xy*lw_c3_x + bid3_yy*lw_3_y + bid3_yz*lw_c3_z + blade3_momentum_x*lw_c3_z + bs3_z*lg_c3_x - blade3_momentum_z*lw_c3_x - bs3_x*lg_c3_z
 blade3_moment_z = bi3_xz*lsp_c3_x + bi3_yz*lsp_3_y + bi3_zz*lsp_c3_z + bid3_xz*lw_c3_x + bid3_yz*lw_3_y + bid3_zz*lw_c3_z + blade3_momentum_y*lw_c3_x + bs3_x*lg_3_y - blade3_momentum_x*lw_3_y - bs3_y*lg_c3_x
-u159 = (-u121) - u122
-u160 = (-u124) - u125
-u161 = uniform_mean - u127 - u128
-u162 = (-u130) - u131
-e3dd = derivative[17]
-f3dd = derivative[14]
-blade3_net_x = pressure*(u77 + c_thrust_edge*e3d + c_thrust_flap*f3d + c_thrust_kappa*u159 + c_thrust_skew*u160 + c_thrust_w*u161 + c_thrust_y*u162) - blade3_force_x - b_ex_turned*e3dd - b_fx_turned*f3dd
-blade3_net_y = pressure*((-u79) - c_tangential_edge*e3d - c_tangential_flap*f3d - c_tangential_kappa*u159 - c_tangential_skew*u160 - c_tangential_w*u161 - c_tangential_y*u162) - blade3_force_y - b_ey_turned*e3dd - b_fy_turned*f3dd
-blade3_net_z = (-blade3_force_z) - e3dd*u156 - f3dd*u157
-blade3_netm_x = b_rey_turned*e3dd + b_rfy_turned*f3dd + u81*(u80 + c_torque_edge*e3d + c_torque_flap*f3d + c_torque_kappa*u159 + c_torque_skew*u160 + c_torque_w*u161 + c_torque_y*u162) - blade3_moment_x
-blade3_netm_y = pressure*radius*(u82 + c_bending_edge*e3d + c_bending_flap*f3d + c_bending_kappa*u159 + c_bending_skew*u160 + c_bending_w*u161 + c_bending_y*u162) - blade3_moment_y - b_rex_turned*e3dd - b_rfx_turned*f3dd
-blade3_netm_z = e3dd*f3*u75 - blade3_moment_z - f3dd*u158
+u228 = (-u199) - u200
+u229 = (-u202) - u203
+u230 = uniform_mean - u205 - u206
+u231 = (-u208) - u209
+blade3_net_x = pressure*(u90 + c_thrust_edge*e3d + c_thrust_flap*f3d + c_thrust_kappa*u228 + c_thrust_skew*u229 + c_thrust_w*u230 + c_thrust_y*u231) - blade3_force_x - b_ex_turned*e3dd - b_fx_turned*f3dd
+blade3_net_y = pressure*((-u167) - c_tangential_edge*e3d - c_tangential_flap*f3d - c_tangential_kappa*u228 - c_tangential_skew*u229 - c_tangential_w*u230 - c_tangential_y*u231) - blade3_force_y - b_ey_turned*e3dd - b_fy_turned*f3dd
+blade3_net_z = (-blade3_force_z) - e3dd*u226 - f3dd*u227
+blade3_netm_x = b_rey_turned*e3dd + b_rfy_turned*f3dd + u168*(u93 + c_torque_edge*e3d + c_torque_flap*f3d + c_torque_kappa*u228 + c_torque_skew*u229 + c_torque_w*u230 + c_torque_y*u231) - blade3_moment_x
+blade3_netm_y = pressure*radius*(u169 + c_bending_edge*e3d + c_bending_flap*f3d + c_bending_kappa*u228 + c_bending_skew*u229 + c_bending_w*u230 + c_bending_y*u231) - blade3_moment_y - b_rex_turned*e3dd - b_rfx_turned*f3dd
+blade3_netm_z = e3dd*f3*u164 - blade3_moment_z - e3*f3dd*u164
 h_m = constants[43]
 rotor_force_x = blade1_net_x*cos_cone + blade1_net_z*sin_cone + blade2_net_x*cos_cone + blade2_net_z*sin_cone + blade3_net_x*cos_cone + blade3_net_z*sin_cone - h_m*hub_full_x
 rotor_force_y = blade1_net_y + half_sqrt3*(blade3_net_z*cos_cone - blade3_net_x*sin_cone) - (0.5)*blade2_net_y - (0.5)*blade3_net_y - h_m*hub_full_y - half_sqrt3*(blade2_net_z*cos_cone - blade2_net_x*sin_cone)
 rotor_force_z = blade1_net_z*cos_cone + (0.5)*blade2_net_x*sin_cone + blade2_net_y*half_sqrt3 + (0.5)*blade3_net_x*sin_cone - blade1_net_x*sin_cone - (0.5)*blade2_net_z*cos_cone - blade3_net_y*half_sqrt3 - (0.5)*blade3_net_z*cos_cone - h_m*hub_full_z
-h_ixx = constants[44]
 rotor_moment_x = blade1_netm_x*cos_cone + blade1_netm_z*sin_cone + blade2_netm_x*cos_cone + blade2_netm_z*sin_cone + blade3_netm_x*cos_cone + blade3_netm_z*sin_cone - h_ixx*hub_fullspin_x
-h_itt = constants[45]
-rotor_moment_y = blade1_netm_y + h_itt*wf_x*won_z + half_sqrt3*(blade3_netm_z*cos_cone - blade3_netm_x*sin_cone) - (0.5)*blade2_netm_y - (0.5)*blade3_netm_y - h_itt*hub_fullspin_y - h_ixx*wf_x*won_z - half_sqrt3*(blade2_netm_z*cos_cone - blade2_netm_x*sin_cone)
-rotor_moment_z = blade1_netm_z*cos_cone + (0.5)*blade2_netm_x*sin_cone + blade2_netm_y*half_sqrt3 + (0.5)*blade3_netm_x*sin_cone + h_ixx*wf_x*won_y - blade1_netm_x*sin_cone - (0.5)*blade2_netm_z*cos_cone - blade3_netm_y*half_sqrt3 - (0.5)*blade3_netm_z*cos_cone - h_itt*hub_fullspin_z - h_itt*wf_x*won_y
-u163 = cos_phi*rotor_force_z + rotor_force_y*sin_phi
-rf_n_x = cos_tilt*rotor_force_x - sin_tilt*u163
+rotor_moment_y = blade1_netm_y + h_itt*wf_x*won_z + half_sqrt3*(blade3_netm_z*cos_cone - blade3_netm_x*sin_cone) - (0.5)*blade2_netm_y - (0.5)*blade3_netm_y - h_itt*hub_fullspin_y - h_ixx*u98 - half_sqrt3*(blade2_netm_z*cos_cone - blade2_netm_x*sin_cone)
+rotor_moment_z = blade1_netm_z*cos_cone + (0.5)*blade2_netm_x*sin_cone + blade2_netm_y*half_sqrt3 + (0.5)*blade3_netm_x*sin_cone + h_ixx*wf_x*won_y - blade1_netm_x*sin_cone - (0.5)*blade2_netm_z*cos_cone - blade3_netm_y*half_sqrt3 - (0.5)*blade3_netm_z*cos_cone - h_itt*hub_fullspin_z - h_itt*u97
+u232 = cos_phi*rotor_force_z + rotor_force_y*sin_phi
+rf_n_x = cos_tilt*rotor_force_x - sin_tilt*u232
 rf_n_y = cos_phi*rotor_force_y - rotor_force_z*sin_phi
-rf_n_z = cos_tilt*u163 + rotor_force_x*sin_tilt
-u164 = cos_phi*rotor_moment_z + rotor_moment_y*sin_phi
-rm_n_x = cos_tilt*rotor_moment_x - sin_tilt*u164
+rf_n_z = cos_tilt*u232 + rotor_force_x*sin_tilt
+u233 = cos_phi*rotor_moment_z + rotor_moment_y*sin_phi
+rm_n_x = cos_tilt*rotor_moment_x - sin_tilt*u233
 rm_n_y = cos_phi*rotor_moment_y - rotor_moment_z*sin_phi
-rm_n_z = cos_tilt*u164 + rotor_moment_x*sin_tilt
-n_y = constants[50]
-n_z = constants[51]
-nacl_ta_x = ta_x + n_z*wa_y - n_y*wa_z
-n_x = constants[49]
-nacl_ta_y = ta_y + n_x*wa_z
-nacl_ta_z = (-u30) - n_x*wa_y
-nacl_ts_y = ts_y + n_z*t_slope_ss
-nacl_ts_z = ts_z - n_y*t_slope_ss
-u165 = n_y*wn_x - n_x*wn_y
-u166 = n_x*wn_z - n_z*wn_x
-nacl_acc_x = top_x + n_z*spin_n_y + u165*wn_y - n_y*spin_n_z - u166*wn_z
-u167 = n_z*wn_y - n_y*wn_z
-nacl_acc_y = top_y + n_x*spin_n_z + u167*wn_z - u165*wn_x
-nacl_acc_z = u166*wn_x - u35 - n_x*spin_n_y - u167*wn_y
+rm_n_z = cos_tilt*u233 + rotor_moment_x*sin_tilt
+nacl_ta_x = u74
+nacl_ta_y = u75
+nacl_ta_z = u76
+nacl_ts_y = u77
+nacl_ts_z = u78
+nacl_acc_x = u81
+nacl_acc_y = u83
+nacl_acc_z = u84
 nacl_full_x = nacl_acc_x + add*nacl_ta_x + sdd*ts_x
 nacl_full_y = nacl_acc_y + add*nacl_ta_y + nacl_ts_y*sdd
 nacl_full_z = nacl_acc_z + add*nacl_ta_z + nacl_ts_z*sdd
 nacl_fullspin_x = -sdd*t_slope_ss
 nacl_fullspin_y = spin_n_y + add*wa_y
 nacl_fullspin_z = spin_n_z + add*wa_z
-n_m = constants[48]
 nac_force_x = -n_m*nacl_full_x
 nac_force_y = -n_m*nacl_full_y
 nac_force_z = -n_m*nacl_full_z
@@ -2236,25 +3367,14 @@ top_force_x = nac_force_x + rf_n_x
 top_force_y = nac_force_y + rf_n_y
 top_force_z = nac_force_z + rf_n_z
 g_i = constants[55]
-gendd = derivative[19]
-u168 = g_i*gendd
-n_ixx = constants[52]
-n_iyy = constants[53]
-n_izz = constants[54]
-top_moment_x = rm_n_x + n_iyy*wn_y*wn_z + n_y*nac_force_z - cos_tilt*u168 - l1*rf_n_y - n_ixx*nacl_fullspin_x - n_izz*u34 - n_z*nac_force_y
-top_moment_y = rm_n_y + l1*rf_n_x + n_izz*wn_x*wn_z + n_z*nac_force_x - l0*rf_n_z - n_ixx*wn_x*wn_z - n_iyy*nacl_fullspin_y - n_x*nac_force_z
-top_moment_z = rm_n_z + l0*rf_n_y + n_ixx*wn_x*wn_y + n_x*nac_force_y - n_iyy*u33 - n_izz*nacl_fullspin_z - n_y*nac_force_x - sin_tilt*u168
-u169 = roll_cos*top_force_z + roll_sin*top_force_y
-base_force_x = pitch_cos*top_force_x + pitch_sin*u169
+u234 = g_i*gendd
+top_moment_x = rm_n_x + u85 + n_y*nac_force_z - u86 - cos_tilt*u234 - l1*rf_n_y - n_ixx*nacl_fullspin_x - n_z*nac_force_y
+top_moment_y = rm_n_y + l1*rf_n_x + n_z*nac_force_x - u88 - l0*rf_n_z - n_iyy*nacl_fullspin_y - n_x*nac_force_z
+top_moment_z = rm_n_z + l0*rf_n_y + n_x*nac_force_y - u89 - n_izz*nacl_fullspin_z - n_y*nac_force_x - sin_tilt*u234
+u235 = roll_cos*top_force_z + roll_sin*top_force_y
+base_force_x = pitch_cos*top_force_x + pitch_sin*u235
 base_force_y = roll_cos*top_force_y - roll_sin*top_force_z
-base_force_z = pitch_cos*u169 - pitch_sin*top_force_x
-d_d = constants[60]
-d_k = constants[59]
-gen = x[9]
-gend = x[19]
-l3 = constants[331]
-l4 = constants[332]
-torque_shaft = d_d*(phid - gend*l3) + d_k*(phi - gen*l3) + l4*torque_commanded
+base_force_z = pitch_cos*u235 - pitch_sin*top_force_x
 t_fa = constants[64]
 t_h = constants[61]
 t_zfa = constants[66]
@@ -2269,10 +3389,8 @@ out[4] = theta_c*(blade3_netm_y - b_root*blade3_net_x) + theta_s*(blade3_netm_x 
 out[5] = theta_c*(blade1_netm_x + b_root*blade1_net_y) - theta_s*(blade1_netm_y - b_root*blade1_net_x)
 out[6] = theta_c*(blade2_netm_x + b_root*blade2_net_y) - theta_s*(blade2_netm_y - b_root*blade2_net_x)
 out[7] = theta_c*(blade3_netm_x + b_root*blade3_net_y) - theta_s*(blade3_netm_y - b_root*blade3_net_x)
-l5 = constants[333]
-out[8] = torque_shaft + l5*phidd
-l6 = constants[334]
-out[9] = l6*pressure*(c_thrust*relative_x + c_thrust_edge*g_mean + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
+out[8] = torque_shaft + l118*phidd
+out[9] = l115*pressure*(c_thrust*relative_x + c_thrust_edge*g_mean + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
 out[10] = torque_commanded
 out[11] = b_tip_ex_turned*e1 + b_tip_fx_turned*f1
 out[12] = b_tip_ex_turned*e2 + b_tip_fx_turned*f2
@@ -2283,10 +3401,10 @@ out[16] = b_tip_ey_turned*e3 + b_tip_fy_turned*f3
 out[17] = add
 out[18] = sdd
 """)
-_loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'derivative', 'out'), LANES)
+_loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'out'), LANES)
 
 
 @njit(**INLINE)
-def loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped):
-    """Load channels of LANES states: x, derivative (24, LANES), wind (5, LANES), control (0, LANES), out (k, LANES)."""
-    _loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped)
+def loads(x, wind, control, out, start, tables, cells, constants, clamped):
+    """Load channels of LANES states: x (24, LANES), wind (5, LANES), control (0, LANES), out (k, LANES)."""
+    _loads(x, wind, control, out, start, tables, cells, constants, clamped)

@@ -328,19 +328,222 @@ def constants(parameters):
     l0 = cos_tilt*overhang
     l1 = tower_to_shaft + overhang*sin_tilt
     l2 = (0.3333333333333333)*q_area
-    l3 = (tg_e*tg_e)
-    l4 = (1.0/g_ratio)
-    l5 = g_ratio*g_rigid/g_efficiency
-    l6 = g_i*(g_ratio*g_ratio)*g_rigid/g_efficiency
-    l7 = 3.0*cos_cone
-    l8 = (0.5)*b_fxfx - (0.5)*b_fyfy
-    l9 = (0.5)*b_fxfx + (0.5)*b_fyfy
-    l10 = (0.5)*b_exex - (0.5)*b_eyey
-    l11 = (0.5)*b_exex + (0.5)*b_eyey
-    l12 = (0.5)*b_fxex - (0.5)*b_fyey
-    l13 = (0.5)*b_fxey + (0.5)*b_fyex
-    l14 = (0.5)*b_fxex + (0.5)*b_fyey
-    l15 = (0.5)*b_fxey - (0.5)*b_fyex
+    l3 = 3.0*b_ex*cos_cone
+    l4 = 3.0*b_ey*cos_cone
+    l5 = (1.5)*b_see*sin_cone
+    l6 = 3.0*b_sfe*sin_cone
+    l7 = 3.0*b_fx*cos_cone
+    l8 = 3.0*b_fy*cos_cone
+    l9 = (1.5)*b_sff*sin_cone
+    l10 = 3.0*b_m1*sin_cone
+    l11 = (1.5)*b_ey
+    l12 = (1.5)*b_ex
+    l13 = (1.5)*b_ex*sin_cone
+    l14 = (1.5)*b_ey*sin_cone
+    l15 = (0.75)*b_see*cos_cone
+    l16 = (1.5)*b_sfe*cos_cone
+    l17 = (1.5)*b_fy
+    l18 = (1.5)*b_fx
+    l19 = (1.5)*b_fx*sin_cone
+    l20 = (1.5)*b_fy*sin_cone
+    l21 = (0.75)*b_sff*cos_cone
+    l22 = 3.0*b_sff*sin_cone
+    l23 = 6.0*b_sfe*sin_cone
+    l24 = 3.0*b_see*sin_cone
+    l25 = (1.5)*b_sff*cos_cone
+    l26 = 3.0*b_sfe*cos_cone
+    l27 = (1.5)*b_see*cos_cone
+    l28 = 3.0*b_rfy*cos_cone
+    l29 = 3.0*b_rfx*cos_cone
+    l30 = 3.0*b_rey*cos_cone
+    l31 = 3.0*b_rex*cos_cone
+    l32 = 3.0*b_fxey*sin_cone - 3.0*b_fyex*sin_cone
+    l33 = (1.5)*b_rfx
+    l34 = (1.5)*b_rfy
+    l35 = (1.5)*b_rfy*sin_cone
+    l36 = (1.5)*b_rfx*sin_cone
+    l37 = (1.5)*b_rex
+    l38 = (1.5)*b_rey
+    l39 = (1.5)*b_rey*sin_cone
+    l40 = (1.5)*b_rex*sin_cone
+    l41 = (1.5)*b_fxey*cos_cone - (1.5)*b_fyex*cos_cone
+    l42 = 6.0*b_rex*cos_cone*sin_cone
+    l43 = 6.0*b_rey*cos_cone*sin_cone
+    l44 = (1.5)*b_exex*(cos_cone*cos_cone) - (1.5)*b_eyey*(cos_cone*cos_cone)
+    l45 = 3.0*b_exey*(cos_cone*cos_cone)
+    l46 = (1.5)*b_exex*(cos_cone*cos_cone) + 3.0*b_exex*(sin_cone*sin_cone) + (1.5)*b_eyey*(cos_cone*cos_cone) + 3.0*b_eyey*(sin_cone*sin_cone) - 3.0*b_rsee*(cos_cone*cos_cone)
+    l47 = 3.0*b_fxex*(cos_cone*cos_cone) - 3.0*b_fyey*(cos_cone*cos_cone)
+    l48 = 3.0*b_fxey*(cos_cone*cos_cone) + 3.0*b_fyex*(cos_cone*cos_cone)
+    l49 = 3.0*b_fxex*(cos_cone*cos_cone) + 6.0*b_fxex*(sin_cone*sin_cone) + 3.0*b_fyey*(cos_cone*cos_cone) + 6.0*b_fyey*(sin_cone*sin_cone) - 6.0*b_rsfe*(cos_cone*cos_cone)
+    l50 = 6.0*b_rfx*cos_cone*sin_cone
+    l51 = 6.0*b_rfy*cos_cone*sin_cone
+    l52 = (1.5)*b_fxfx*(cos_cone*cos_cone) - (1.5)*b_fyfy*(cos_cone*cos_cone)
+    l53 = 3.0*b_fxfy*(cos_cone*cos_cone)
+    l54 = (1.5)*b_fxfx*(cos_cone*cos_cone) + 3.0*b_fxfx*(sin_cone*sin_cone) + (1.5)*b_fyfy*(cos_cone*cos_cone) + 3.0*b_fyfy*(sin_cone*sin_cone) - 3.0*b_rsff*(cos_cone*cos_cone)
+    l55 = 3.0*b_m2*(cos_cone*cos_cone)
+    l56 = (1.5)*b_rex*(cos_cone*cos_cone) - (1.5)*b_rex*(sin_cone*sin_cone)
+    l57 = (1.5)*b_rey*(cos_cone*cos_cone) - (1.5)*b_rey*(sin_cone*sin_cone)
+    l58 = (1.5)*b_exey*cos_cone
+    l59 = (0.75)*b_exex*cos_cone - (0.75)*b_eyey*cos_cone
+    l60 = (0.75)*b_exex*cos_cone*sin_cone - (0.75)*b_eyey*cos_cone*sin_cone
+    l61 = (1.5)*b_exey*cos_cone*sin_cone
+    l62 = (0.75)*b_exex*cos_cone*sin_cone + (0.75)*b_eyey*cos_cone*sin_cone + (1.5)*b_rsee*cos_cone*sin_cone
+    l63 = (1.5)*b_fxey*cos_cone + (1.5)*b_fyex*cos_cone
+    l64 = (1.5)*b_fxex*cos_cone - (1.5)*b_fyey*cos_cone
+    l65 = (1.5)*b_fxex*cos_cone*sin_cone - (1.5)*b_fyey*cos_cone*sin_cone
+    l66 = (1.5)*b_fxey*cos_cone*sin_cone + (1.5)*b_fyex*cos_cone*sin_cone
+    l67 = (1.5)*b_fxex*cos_cone*sin_cone + (1.5)*b_fyey*cos_cone*sin_cone + 3.0*b_rsfe*cos_cone*sin_cone
+    l68 = (1.5)*b_rfx*(cos_cone*cos_cone) - (1.5)*b_rfx*(sin_cone*sin_cone)
+    l69 = (1.5)*b_rfy*(cos_cone*cos_cone) - (1.5)*b_rfy*(sin_cone*sin_cone)
+    l70 = (1.5)*b_fxfy*cos_cone
+    l71 = (0.75)*b_fxfx*cos_cone - (0.75)*b_fyfy*cos_cone
+    l72 = (0.75)*b_fxfx*cos_cone*sin_cone - (0.75)*b_fyfy*cos_cone*sin_cone
+    l73 = (1.5)*b_fxfy*cos_cone*sin_cone
+    l74 = (0.75)*b_fxfx*cos_cone*sin_cone + (0.75)*b_fyfy*cos_cone*sin_cone + (1.5)*b_rsff*cos_cone*sin_cone
+    l75 = (1.5)*b_rey*cos_cone
+    l76 = (1.5)*b_rex*cos_cone
+    l77 = (1.5)*b_rex*cos_cone*sin_cone
+    l78 = (1.5)*b_rey*cos_cone*sin_cone
+    l79 = (1.5)*b_exey*sin_cone
+    l80 = (0.75)*b_exex*sin_cone - (0.75)*b_eyey*sin_cone
+    l81 = (0.375)*b_exex*(sin_cone*sin_cone) + (0.375)*b_exex - (0.375)*b_eyey*(sin_cone*sin_cone) - (0.375)*b_eyey
+    l82 = (0.75)*b_exey*(sin_cone*sin_cone) + (0.75)*b_exey
+    l83 = (0.75)*b_exex*(cos_cone*cos_cone) + (0.375)*b_exex*(sin_cone*sin_cone) + (0.75)*b_eyey*(cos_cone*cos_cone) + (0.375)*b_eyey*(sin_cone*sin_cone) + (0.75)*b_rsee - (0.375)*b_exex - (0.375)*b_eyey - (0.75)*b_rsee*(sin_cone*sin_cone)
+    l84 = (1.5)*b_fxey*sin_cone + (1.5)*b_fyex*sin_cone
+    l85 = (1.5)*b_fxex*sin_cone - (1.5)*b_fyey*sin_cone
+    l86 = (0.75)*b_fxex*(sin_cone*sin_cone) + (0.75)*b_fxex - (0.75)*b_fyey*(sin_cone*sin_cone) - (0.75)*b_fyey
+    l87 = (0.75)*b_fxey*(sin_cone*sin_cone) + (0.75)*b_fxey + (0.75)*b_fyex*(sin_cone*sin_cone) + (0.75)*b_fyex
+    l88 = (1.5)*b_fxex*(cos_cone*cos_cone) + (0.75)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fyey*(cos_cone*cos_cone) + (0.75)*b_fyey*(sin_cone*sin_cone) + (1.5)*b_rsfe - (0.75)*b_fxex - (0.75)*b_fyey - (1.5)*b_rsfe*(sin_cone*sin_cone)
+    l89 = (1.5)*b_rfy*cos_cone
+    l90 = (1.5)*b_rfx*cos_cone
+    l91 = (1.5)*b_rfx*cos_cone*sin_cone
+    l92 = (1.5)*b_rfy*cos_cone*sin_cone
+    l93 = (1.5)*b_fxfy*sin_cone
+    l94 = (0.75)*b_fxfx*sin_cone - (0.75)*b_fyfy*sin_cone
+    l95 = (0.375)*b_fxfx*(sin_cone*sin_cone) + (0.375)*b_fxfx - (0.375)*b_fyfy*(sin_cone*sin_cone) - (0.375)*b_fyfy
+    l96 = (0.75)*b_fxfy*(sin_cone*sin_cone) + (0.75)*b_fxfy
+    l97 = (0.75)*b_fxfx*(cos_cone*cos_cone) + (0.375)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fyfy*(cos_cone*cos_cone) + (0.375)*b_fyfy*(sin_cone*sin_cone) + (0.75)*b_rsff - (0.375)*b_fxfx - (0.375)*b_fyfy - (0.75)*b_rsff*(sin_cone*sin_cone)
+    l98 = 3.0*b_rex*cos_cone*sin_cone
+    l99 = 3.0*b_rey*cos_cone*sin_cone
+    l100 = (0.75)*b_exex*(sin_cone*sin_cone) + (0.75)*b_eyey - (0.75)*b_exex - (0.75)*b_eyey*(sin_cone*sin_cone)
+    l101 = (1.5)*b_exey*(sin_cone*sin_cone) - (1.5)*b_exey
+    l102 = (1.5)*b_exex*(cos_cone*cos_cone) + (0.75)*b_exex*(sin_cone*sin_cone) + (0.75)*b_exex + (1.5)*b_eyey*(cos_cone*cos_cone) + (0.75)*b_eyey*(sin_cone*sin_cone) + (0.75)*b_eyey - (1.5)*b_rsee*(sin_cone*sin_cone) - (1.5)*b_rsee
+    l103 = (1.5)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fyey - (1.5)*b_fxex - (1.5)*b_fyey*(sin_cone*sin_cone)
+    l104 = (1.5)*b_fxey*(sin_cone*sin_cone) + (1.5)*b_fyex*(sin_cone*sin_cone) - (1.5)*b_fxey - (1.5)*b_fyex
+    l105 = 3.0*b_fxex*(cos_cone*cos_cone) + (1.5)*b_fxex*(sin_cone*sin_cone) + (1.5)*b_fxex + 3.0*b_fyey*(cos_cone*cos_cone) + (1.5)*b_fyey*(sin_cone*sin_cone) + (1.5)*b_fyey - 3.0*b_rsfe*(sin_cone*sin_cone) - 3.0*b_rsfe
+    l106 = 3.0*b_rfx*cos_cone*sin_cone
+    l107 = 3.0*b_rfy*cos_cone*sin_cone
+    l108 = (0.75)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fyfy - (0.75)*b_fxfx - (0.75)*b_fyfy*(sin_cone*sin_cone)
+    l109 = (1.5)*b_fxfy*(sin_cone*sin_cone) - (1.5)*b_fxfy
+    l110 = (1.5)*b_fxfx*(cos_cone*cos_cone) + (0.75)*b_fxfx*(sin_cone*sin_cone) + (0.75)*b_fxfx + (1.5)*b_fyfy*(cos_cone*cos_cone) + (0.75)*b_fyfy*(sin_cone*sin_cone) + (0.75)*b_fyfy - (1.5)*b_rsff*(sin_cone*sin_cone) - (1.5)*b_rsff
+    l111 = (1.5)*b_m2*(sin_cone*sin_cone) + (1.5)*b_m2
+    l112 = h_m + 3.0*b_m
+    l113 = gravity*t_gfa - t_ka
+    l114 = gravity*t_gss - t_ks
+    l115 = 3.0*cos_cone
+    l116 = (tg_e*tg_e)
+    l117 = (1.0/g_ratio)
+    l118 = g_ratio*g_rigid/g_efficiency
+    l119 = g_i*(g_ratio*g_ratio)*g_rigid/g_efficiency
+    l120 = b_fxfx + b_fyfy
+    l121 = b_fxex + b_fyey
+    l122 = 2.0*b_fxey*sin_cone - 2.0*b_fyex*sin_cone
+    l123 = 2.0*b_fxey*cos_cone - 2.0*b_fyex*cos_cone
+    l124 = b_fx*cos_cone
+    l125 = b_fy*cos_cone
+    l126 = b_rfy*cos_cone
+    l127 = b_rfx*cos_cone
+    l128 = b_fx*sin_cone
+    l129 = b_fy*sin_cone
+    l130 = b_rfy*sin_cone
+    l131 = b_rfx*sin_cone
+    l132 = b_sff*sin_cone
+    l133 = b_sff*cos_cone
+    l134 = b_sfe*sin_cone
+    l135 = b_fxey*sin_cone - b_fyex*sin_cone
+    l136 = b_sfe*cos_cone
+    l137 = b_fxey*cos_cone - b_fyex*cos_cone
+    l138 = b_rfx*cos_cone*sin_cone
+    l139 = b_rfy*cos_cone*sin_cone
+    l140 = b_rfx*(cos_cone*cos_cone) - b_rfx*(sin_cone*sin_cone)
+    l141 = b_rfy*(cos_cone*cos_cone) - b_rfy*(sin_cone*sin_cone)
+    l142 = (0.5)*b_fxfx*(cos_cone*cos_cone) - (0.5)*b_fyfy*(cos_cone*cos_cone)
+    l143 = b_fxfy*(cos_cone*cos_cone)
+    l144 = (0.5)*b_fxfx*(cos_cone*cos_cone) + b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fyfy*(cos_cone*cos_cone) + b_fyfy*(sin_cone*sin_cone) - b_rsff*(cos_cone*cos_cone)
+    l145 = (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fyfy - (0.5)*b_fxfx - (0.5)*b_fyfy*(sin_cone*sin_cone)
+    l146 = b_fxfy*(sin_cone*sin_cone) - b_fxfy
+    l147 = b_fxfx*(cos_cone*cos_cone) + (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fxfx + b_fyfy*(cos_cone*cos_cone) + (0.5)*b_fyfy*(sin_cone*sin_cone) + (0.5)*b_fyfy - b_rsff - b_rsff*(sin_cone*sin_cone)
+    l148 = 2.0*b_fxfy*cos_cone
+    l149 = b_fxfx*cos_cone - b_fyfy*cos_cone
+    l150 = b_fxfx*cos_cone*sin_cone - b_fyfy*cos_cone*sin_cone
+    l151 = 2.0*b_fxfy*cos_cone*sin_cone
+    l152 = b_fxfx*cos_cone*sin_cone + b_fyfy*cos_cone*sin_cone + 2.0*b_rsff*cos_cone*sin_cone
+    l153 = 2.0*b_fxfy*sin_cone
+    l154 = b_fxfx*sin_cone - b_fyfy*sin_cone
+    l155 = (0.5)*b_fxfx*(sin_cone*sin_cone) + (0.5)*b_fxfx - (0.5)*b_fyfy*(sin_cone*sin_cone) - (0.5)*b_fyfy
+    l156 = b_fxfy + b_fxfy*(sin_cone*sin_cone)
+    l157 = b_rsff + b_fxfx*(cos_cone*cos_cone) + (0.5)*b_fxfx*(sin_cone*sin_cone) + b_fyfy*(cos_cone*cos_cone) + (0.5)*b_fyfy*(sin_cone*sin_cone) - (0.5)*b_fxfx - (0.5)*b_fyfy - b_rsff*(sin_cone*sin_cone)
+    l158 = (0.5)*b_fxex*(cos_cone*cos_cone) - (0.5)*b_fyey*(cos_cone*cos_cone)
+    l159 = (0.5)*b_fxey*(cos_cone*cos_cone) + (0.5)*b_fyex*(cos_cone*cos_cone)
+    l160 = (0.5)*b_fxex*(cos_cone*cos_cone) + b_fxex*(sin_cone*sin_cone) + (0.5)*b_fyey*(cos_cone*cos_cone) + b_fyey*(sin_cone*sin_cone) - b_rsfe*(cos_cone*cos_cone)
+    l161 = (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fyey - (0.5)*b_fxex - (0.5)*b_fyey*(sin_cone*sin_cone)
+    l162 = (0.5)*b_fxey*(sin_cone*sin_cone) + (0.5)*b_fyex*(sin_cone*sin_cone) - (0.5)*b_fxey - (0.5)*b_fyex
+    l163 = b_fxex*(cos_cone*cos_cone) + (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fxex + b_fyey*(cos_cone*cos_cone) + (0.5)*b_fyey*(sin_cone*sin_cone) + (0.5)*b_fyey - b_rsfe - b_rsfe*(sin_cone*sin_cone)
+    l164 = b_fxey*cos_cone + b_fyex*cos_cone
+    l165 = b_fxex*cos_cone - b_fyey*cos_cone
+    l166 = b_fxex*cos_cone*sin_cone - b_fyey*cos_cone*sin_cone
+    l167 = b_fxey*cos_cone*sin_cone + b_fyex*cos_cone*sin_cone
+    l168 = b_fxex*cos_cone*sin_cone + b_fyey*cos_cone*sin_cone + 2.0*b_rsfe*cos_cone*sin_cone
+    l169 = b_fxey*sin_cone + b_fyex*sin_cone
+    l170 = b_fxex*sin_cone - b_fyey*sin_cone
+    l171 = (0.5)*b_fxex*(sin_cone*sin_cone) + (0.5)*b_fxex - (0.5)*b_fyey*(sin_cone*sin_cone) - (0.5)*b_fyey
+    l172 = (0.5)*b_fxey*(sin_cone*sin_cone) + (0.5)*b_fxey + (0.5)*b_fyex*(sin_cone*sin_cone) + (0.5)*b_fyex
+    l173 = b_rsfe + b_fxex*(cos_cone*cos_cone) + (0.5)*b_fxex*(sin_cone*sin_cone) + b_fyey*(cos_cone*cos_cone) + (0.5)*b_fyey*(sin_cone*sin_cone) - (0.5)*b_fxex - (0.5)*b_fyey - b_rsfe*(sin_cone*sin_cone)
+    l174 = b_ex*cos_cone
+    l175 = b_ey*cos_cone
+    l176 = b_rey*cos_cone
+    l177 = b_rex*cos_cone
+    l178 = b_ex*sin_cone
+    l179 = b_ey*sin_cone
+    l180 = b_rey*sin_cone
+    l181 = b_rex*sin_cone
+    l182 = b_see*sin_cone
+    l183 = b_see*cos_cone
+    l184 = b_rex*cos_cone*sin_cone
+    l185 = b_rey*cos_cone*sin_cone
+    l186 = b_rex*(cos_cone*cos_cone) - b_rex*(sin_cone*sin_cone)
+    l187 = b_rey*(cos_cone*cos_cone) - b_rey*(sin_cone*sin_cone)
+    l188 = (0.5)*b_exex*(cos_cone*cos_cone) - (0.5)*b_eyey*(cos_cone*cos_cone)
+    l189 = b_exey*(cos_cone*cos_cone)
+    l190 = (0.5)*b_exex*(cos_cone*cos_cone) + b_exex*(sin_cone*sin_cone) + (0.5)*b_eyey*(cos_cone*cos_cone) + b_eyey*(sin_cone*sin_cone) - b_rsee*(cos_cone*cos_cone)
+    l191 = (0.5)*b_exex*(sin_cone*sin_cone) + (0.5)*b_eyey - (0.5)*b_exex - (0.5)*b_eyey*(sin_cone*sin_cone)
+    l192 = b_exey*(sin_cone*sin_cone) - b_exey
+    l193 = b_exex*(cos_cone*cos_cone) + (0.5)*b_exex*(sin_cone*sin_cone) + (0.5)*b_exex + b_eyey*(cos_cone*cos_cone) + (0.5)*b_eyey*(sin_cone*sin_cone) + (0.5)*b_eyey - b_rsee - b_rsee*(sin_cone*sin_cone)
+    l194 = 2.0*b_exey*cos_cone
+    l195 = b_exex*cos_cone - b_eyey*cos_cone
+    l196 = b_exex*cos_cone*sin_cone - b_eyey*cos_cone*sin_cone
+    l197 = 2.0*b_exey*cos_cone*sin_cone
+    l198 = b_exex*cos_cone*sin_cone + b_eyey*cos_cone*sin_cone + 2.0*b_rsee*cos_cone*sin_cone
+    l199 = 2.0*b_exey*sin_cone
+    l200 = b_exex*sin_cone - b_eyey*sin_cone
+    l201 = (0.5)*b_exex*(sin_cone*sin_cone) + (0.5)*b_exex - (0.5)*b_eyey*(sin_cone*sin_cone) - (0.5)*b_eyey
+    l202 = b_exey + b_exey*(sin_cone*sin_cone)
+    l203 = b_rsee + b_exex*(cos_cone*cos_cone) + (0.5)*b_exex*(sin_cone*sin_cone) + b_eyey*(cos_cone*cos_cone) + (0.5)*b_eyey*(sin_cone*sin_cone) - (0.5)*b_exex - (0.5)*b_eyey - b_rsee*(sin_cone*sin_cone)
+    l204 = b_exex + b_eyey
+    l205 = l121/l120
+    l206 = (1.0/l120)
+    l207 = (1.0/(l204 - (l121*l121)/l120))
+    l208 = g_efficiency/g_ratio
+    l209 = (1.0/g_i)
+    l210 = g_ratio*g_rigid
+    l211 = (0.5)*b_fxfx - (0.5)*b_fyfy
+    l212 = (0.5)*b_fxfx + (0.5)*b_fyfy
+    l213 = (0.5)*b_exex - (0.5)*b_eyey
+    l214 = (0.5)*b_exex + (0.5)*b_eyey
+    l215 = (0.5)*b_fxex - (0.5)*b_fyey
+    l216 = (0.5)*b_fxey + (0.5)*b_fyex
+    l217 = (0.5)*b_fxex + (0.5)*b_fyey
+    l218 = (0.5)*b_fxey - (0.5)*b_fyex
     return np.array([
         b_m,
         b_m1,
@@ -665,6 +868,209 @@ def constants(parameters):
         l13,
         l14,
         l15,
+        l16,
+        l17,
+        l18,
+        l19,
+        l20,
+        l21,
+        l22,
+        l23,
+        l24,
+        l25,
+        l26,
+        l27,
+        l28,
+        l29,
+        l30,
+        l31,
+        l32,
+        l33,
+        l34,
+        l35,
+        l36,
+        l37,
+        l38,
+        l39,
+        l40,
+        l41,
+        l42,
+        l43,
+        l44,
+        l45,
+        l46,
+        l47,
+        l48,
+        l49,
+        l50,
+        l51,
+        l52,
+        l53,
+        l54,
+        l55,
+        l56,
+        l57,
+        l58,
+        l59,
+        l60,
+        l61,
+        l62,
+        l63,
+        l64,
+        l65,
+        l66,
+        l67,
+        l68,
+        l69,
+        l70,
+        l71,
+        l72,
+        l73,
+        l74,
+        l75,
+        l76,
+        l77,
+        l78,
+        l79,
+        l80,
+        l81,
+        l82,
+        l83,
+        l84,
+        l85,
+        l86,
+        l87,
+        l88,
+        l89,
+        l90,
+        l91,
+        l92,
+        l93,
+        l94,
+        l95,
+        l96,
+        l97,
+        l98,
+        l99,
+        l100,
+        l101,
+        l102,
+        l103,
+        l104,
+        l105,
+        l106,
+        l107,
+        l108,
+        l109,
+        l110,
+        l111,
+        l112,
+        l113,
+        l114,
+        l115,
+        l116,
+        l117,
+        l118,
+        l119,
+        l120,
+        l121,
+        l122,
+        l123,
+        l124,
+        l125,
+        l126,
+        l127,
+        l128,
+        l129,
+        l130,
+        l131,
+        l132,
+        l133,
+        l134,
+        l135,
+        l136,
+        l137,
+        l138,
+        l139,
+        l140,
+        l141,
+        l142,
+        l143,
+        l144,
+        l145,
+        l146,
+        l147,
+        l148,
+        l149,
+        l150,
+        l151,
+        l152,
+        l153,
+        l154,
+        l155,
+        l156,
+        l157,
+        l158,
+        l159,
+        l160,
+        l161,
+        l162,
+        l163,
+        l164,
+        l165,
+        l166,
+        l167,
+        l168,
+        l169,
+        l170,
+        l171,
+        l172,
+        l173,
+        l174,
+        l175,
+        l176,
+        l177,
+        l178,
+        l179,
+        l180,
+        l181,
+        l182,
+        l183,
+        l184,
+        l185,
+        l186,
+        l187,
+        l188,
+        l189,
+        l190,
+        l191,
+        l192,
+        l193,
+        l194,
+        l195,
+        l196,
+        l197,
+        l198,
+        l199,
+        l200,
+        l201,
+        l202,
+        l203,
+        l204,
+        l205,
+        l206,
+        l207,
+        l208,
+        l209,
+        l210,
+        l211,
+        l212,
+        l213,
+        l214,
+        l215,
+        l216,
+        l217,
+        l218,
     ], dtype=np.float64)
 
 
@@ -1616,6 +2022,240 @@ theta_s = 2.0*theta_half_cos*theta_half_sin
 theta_c = 1.0 - 2.0*(theta_half_sin*theta_half_sin)
 theta_ss = 2.0*theta_c*theta_s
 theta_cc = 1.0 - 2.0*(theta_s*theta_s)
+l3 = constants[310]
+l4 = constants[311]
+k3_turned = l3*theta_c + l4*theta_s
+l7 = constants[314]
+l8 = constants[315]
+k6_turned = l7*theta_c + l8*theta_s
+l11 = constants[318]
+l12 = constants[319]
+k9_turned = l11*theta_c - l12*theta_s
+l13 = constants[320]
+l14 = constants[321]
+k10_turned = l13*theta_c + l14*theta_s
+l17 = constants[324]
+l18 = constants[325]
+k13_turned = l17*theta_c - l18*theta_s
+l19 = constants[326]
+l20 = constants[327]
+k14_turned = l19*theta_c + l20*theta_s
+l28 = constants[335]
+l29 = constants[336]
+k22_turned = l28*theta_c - l29*theta_s
+l30 = constants[337]
+l31 = constants[338]
+k23_turned = l30*theta_c - l31*theta_s
+l33 = constants[340]
+l34 = constants[341]
+k25_turned = l33*theta_c + l34*theta_s
+l35 = constants[342]
+l36 = constants[343]
+k26_turned = l35*theta_c - l36*theta_s
+l37 = constants[344]
+l38 = constants[345]
+k27_turned = l37*theta_c + l38*theta_s
+l39 = constants[346]
+l40 = constants[347]
+k28_turned = l39*theta_c - l40*theta_s
+l42 = constants[349]
+l43 = constants[350]
+k30_turned = l42*theta_c + l43*theta_s
+l44 = constants[351]
+l45 = constants[352]
+l46 = constants[353]
+k31_turned = l46 - l44*theta_cc - l45*theta_ss
+l47 = constants[354]
+l48 = constants[355]
+l49 = constants[356]
+k32_turned = l49 - l47*theta_cc - l48*theta_ss
+l50 = constants[357]
+l51 = constants[358]
+k33_turned = l50*theta_c + l51*theta_s
+l52 = constants[359]
+l53 = constants[360]
+l54 = constants[361]
+k34_turned = l54 - l52*theta_cc - l53*theta_ss
+l56 = constants[363]
+l57 = constants[364]
+k36_turned = l56*theta_c + l57*theta_s
+l58 = constants[365]
+l59 = constants[366]
+k37_turned = l58*theta_cc - l59*theta_ss
+l60 = constants[367]
+l61 = constants[368]
+l62 = constants[369]
+k38_turned = l62 + l60*theta_cc + l61*theta_ss
+l63 = constants[370]
+l64 = constants[371]
+k39_turned = l63*theta_cc - l64*theta_ss
+l65 = constants[372]
+l66 = constants[373]
+l67 = constants[374]
+k40_turned = l67 + l65*theta_cc + l66*theta_ss
+l68 = constants[375]
+l69 = constants[376]
+k41_turned = l68*theta_c + l69*theta_s
+l70 = constants[377]
+l71 = constants[378]
+k42_turned = l70*theta_cc - l71*theta_ss
+l72 = constants[379]
+l73 = constants[380]
+l74 = constants[381]
+k43_turned = l74 + l72*theta_cc + l73*theta_ss
+l75 = constants[382]
+l76 = constants[383]
+k44_turned = l75*theta_c - l76*theta_s
+l77 = constants[384]
+l78 = constants[385]
+k45_turned = l77*theta_c + l78*theta_s
+l79 = constants[386]
+l80 = constants[387]
+k46_turned = l79*theta_cc - l80*theta_ss
+l81 = constants[388]
+l82 = constants[389]
+l83 = constants[390]
+k47_turned = l83 - l81*theta_cc - l82*theta_ss
+l84 = constants[391]
+l85 = constants[392]
+k48_turned = l84*theta_cc - l85*theta_ss
+l86 = constants[393]
+l87 = constants[394]
+l88 = constants[395]
+k49_turned = l88 - l86*theta_cc - l87*theta_ss
+l89 = constants[396]
+l90 = constants[397]
+k50_turned = l89*theta_c - l90*theta_s
+l91 = constants[398]
+l92 = constants[399]
+k51_turned = l91*theta_c + l92*theta_s
+l93 = constants[400]
+l94 = constants[401]
+k52_turned = l93*theta_cc - l94*theta_ss
+l95 = constants[402]
+l96 = constants[403]
+l97 = constants[404]
+k53_turned = l97 - l95*theta_cc - l96*theta_ss
+l98 = constants[405]
+l99 = constants[406]
+k54_turned = l98*theta_c + l99*theta_s
+l100 = constants[407]
+l101 = constants[408]
+l102 = constants[409]
+k55_turned = l102 - l100*theta_cc - l101*theta_ss
+l103 = constants[410]
+l104 = constants[411]
+l105 = constants[412]
+k56_turned = l105 - l103*theta_cc - l104*theta_ss
+l106 = constants[413]
+l107 = constants[414]
+k57_turned = l106*theta_c + l107*theta_s
+l108 = constants[415]
+l109 = constants[416]
+l110 = constants[417]
+k58_turned = l110 - l108*theta_cc - l109*theta_ss
+l124 = constants[431]
+l125 = constants[432]
+k72_turned = l124*theta_c + l125*theta_s
+l126 = constants[433]
+l127 = constants[434]
+k73_turned = l126*theta_c - l127*theta_s
+l128 = constants[435]
+l129 = constants[436]
+k74_turned = l128*theta_c + l129*theta_s
+l130 = constants[437]
+l131 = constants[438]
+k75_turned = l130*theta_c - l131*theta_s
+l138 = constants[445]
+l139 = constants[446]
+k82_turned = l138*theta_c + l139*theta_s
+l140 = constants[447]
+l141 = constants[448]
+k83_turned = l140*theta_c + l141*theta_s
+l142 = constants[449]
+l143 = constants[450]
+l144 = constants[451]
+k84_turned = l144 - l142*theta_cc - l143*theta_ss
+l145 = constants[452]
+l146 = constants[453]
+l147 = constants[454]
+k85_turned = l147 - l145*theta_cc - l146*theta_ss
+l148 = constants[455]
+l149 = constants[456]
+k86_turned = l148*theta_cc - l149*theta_ss
+l150 = constants[457]
+l151 = constants[458]
+l152 = constants[459]
+k87_turned = l152 + l150*theta_cc + l151*theta_ss
+l153 = constants[460]
+l154 = constants[461]
+k88_turned = l153*theta_cc - l154*theta_ss
+l155 = constants[462]
+l156 = constants[463]
+l157 = constants[464]
+k89_turned = l157 - l155*theta_cc - l156*theta_ss
+l158 = constants[465]
+l159 = constants[466]
+l160 = constants[467]
+k90_turned = l160 - l158*theta_cc - l159*theta_ss
+l161 = constants[468]
+l162 = constants[469]
+l163 = constants[470]
+k91_turned = l163 - l161*theta_cc - l162*theta_ss
+l164 = constants[471]
+l165 = constants[472]
+k92_turned = l164*theta_cc - l165*theta_ss
+l166 = constants[473]
+l167 = constants[474]
+l168 = constants[475]
+k93_turned = l168 + l166*theta_cc + l167*theta_ss
+l169 = constants[476]
+l170 = constants[477]
+k94_turned = l169*theta_cc - l170*theta_ss
+l171 = constants[478]
+l172 = constants[479]
+l173 = constants[480]
+k95_turned = l173 - l171*theta_cc - l172*theta_ss
+l174 = constants[481]
+l175 = constants[482]
+k96_turned = l174*theta_c + l175*theta_s
+l176 = constants[483]
+l177 = constants[484]
+k97_turned = l176*theta_c - l177*theta_s
+l178 = constants[485]
+l179 = constants[486]
+k98_turned = l178*theta_c + l179*theta_s
+l180 = constants[487]
+l181 = constants[488]
+k99_turned = l180*theta_c - l181*theta_s
+l184 = constants[491]
+l185 = constants[492]
+k102_turned = l184*theta_c + l185*theta_s
+l186 = constants[493]
+l187 = constants[494]
+k103_turned = l186*theta_c + l187*theta_s
+l188 = constants[495]
+l189 = constants[496]
+l190 = constants[497]
+k104_turned = l190 - l188*theta_cc - l189*theta_ss
+l191 = constants[498]
+l192 = constants[499]
+l193 = constants[500]
+k105_turned = l193 - l191*theta_cc - l192*theta_ss
+l194 = constants[501]
+l195 = constants[502]
+k106_turned = l194*theta_cc - l195*theta_ss
+l196 = constants[503]
+l197 = constants[504]
+l198 = constants[505]
+k107_turned = l198 + l196*theta_cc + l197*theta_ss
+l199 = constants[506]
+l200 = constants[507]
+k108_turned = l199*theta_cc - l200*theta_ss
+l201 = constants[508]
+l202 = constants[509]
+l203 = constants[510]
+k109_turned = l203 - l201*theta_cc - l202*theta_ss
 b_fx = constants[3]
 b_fy = constants[4]
 b_fx_turned = b_fx*theta_c + b_fy*theta_s
@@ -1641,37 +2281,29 @@ b_tip_ey = constants[35]
 b_tip_ex_turned = b_tip_ex*theta_c + b_tip_ey*theta_s
 b_tip_ey_turned = b_tip_ey*theta_c - b_tip_ex*theta_s
 b_fxfy = constants[13]
-l8 = constants[315]
-u0 = b_fxfy*theta_ss + l8*theta_cc
-l9 = constants[316]
-b_fxfx_turned = l9 + u0
-b_fyfy_turned = l9 - u0
-b_fxfy_turned = b_fxfy*theta_cc - l8*theta_ss
+l211 = constants[518]
+u0 = b_fxfy*theta_ss + l211*theta_cc
+l212 = constants[519]
+b_fxfx_turned = l212 + u0
+b_fyfy_turned = l212 - u0
+b_fxfy_turned = b_fxfy*theta_cc - l211*theta_ss
 b_exey = constants[16]
-l10 = constants[317]
-u1 = b_exey*theta_ss + l10*theta_cc
-l11 = constants[318]
-b_exex_turned = l11 + u1
-b_eyey_turned = l11 - u1
-b_exey_turned = b_exey*theta_cc - l10*theta_ss
-l12 = constants[319]
-l13 = constants[320]
-u2 = l12*theta_cc + l13*theta_ss
-l14 = constants[321]
-b_fxex_turned = l14 + u2
-b_fyey_turned = l14 - u2
-u3 = l12*theta_ss
-l15 = constants[322]
-b_fxey_turned = l15 + l13*theta_cc - u3
-b_fyex_turned = l13*theta_cc - l15 - u3
-f1d = x[12]
-f2d = x[13]
-f3d = x[14]
-d_mean = (0.3333333333333333)*f1d + (0.3333333333333333)*f2d + (0.3333333333333333)*f3d
-e1d = x[15]
-e2d = x[16]
-e3d = x[17]
-g_mean = (0.3333333333333333)*e1d + (0.3333333333333333)*e2d + (0.3333333333333333)*e3d
+l213 = constants[520]
+u1 = b_exey*theta_ss + l213*theta_cc
+l214 = constants[521]
+b_exex_turned = l214 + u1
+b_eyey_turned = l214 - u1
+b_exey_turned = b_exey*theta_cc - l213*theta_ss
+l215 = constants[522]
+l216 = constants[523]
+u2 = l215*theta_cc + l216*theta_ss
+l217 = constants[524]
+b_fxex_turned = l217 + u2
+b_fyey_turned = l217 - u2
+u3 = l215*theta_ss
+l218 = constants[525]
+b_fxey_turned = l218 + l216*theta_cc - u3
+b_fyex_turned = l216*theta_cc - l218 - u3
 a = x[0]
 t_slope_fa = constants[68]
 pitch_angle = a*t_slope_fa
@@ -1790,348 +2422,248 @@ skew_sin = (-u18) - u19
 uniform_mean = cos_tilt*w_fold_mean
 uniform_cos = cos_tilt*w_fold_cos
 uniform_sin = cos_tilt*w_fold_sin
-add = derivative[10]
-sdd = derivative[11]
-hub_full_x = acc_f_s_x + add*tha_s_x + sdd*ths_s_x
-hub_full_y = acc_f_y + add*tha_y + sdd*ths_y
-hub_full_z = acc_f_z + add*tha_z + sdd*ths_z
-phidd = derivative[18]
-hub_fullspin_x = phidd + spin_f_s_x + add*wha_s_x + sdd*whs_s_x
-hub_fullspin_y = spin_h_y + add*wha_y + sdd*whs_y
-hub_fullspin_z = spin_h_z + add*wha_z + sdd*whs_z
-cos_cone = constants[39]
-u21 = cos_cone*wf_x
-sin_cone = constants[40]
-lw_c1_x = u21 - sin_cone*won_z
-u22 = sin_cone*wf_x
-lw_c1_z = u22 + cos_cone*won_z
-u23 = cos_cone*hub_full_x
-lg_c1_x = u23 - hub_full_z*sin_cone
-u24 = hub_full_x*sin_cone
-lg_c1_z = u24 + cos_cone*hub_full_z
-u25 = cos_cone*hub_fullspin_x
-lsp_c1_x = u25 - hub_fullspin_z*sin_cone
-u26 = hub_fullspin_x*sin_cone
-lsp_c1_z = u26 + cos_cone*hub_fullspin_z
-e1 = x[5]
 f1 = x[2]
-bs1_x = b_ex_turned*e1 + b_fx_turned*f1
-bs1_y = b_ey_turned*e1 + b_fy_turned*f1
-b_m1 = constants[1]
-u27 = -b_m1
-u28 = (e1*e1)
-b_see = constants[23]
-u29 = (0.5)*b_see
-u30 = (f1*f1)
-b_sff = constants[21]
-u31 = (0.5)*b_sff
-b_sfe = constants[22]
-u32 = b_sfe*f1
-bs1_z = (-u27) - e1*u32 - u28*u29 - u30*u31
-u33 = 2.0*e1
-u34 = b_fyey_turned*u33
-u35 = b_eyey_turned*u28 + b_fyfy_turned*u30 + f1*u34
-b_rsfe = constants[25]
-u36 = b_rsfe*u33
-b_m2 = constants[2]
-b_rsee = constants[26]
-b_rsff = constants[24]
-u37 = b_m2 - b_rsee*u28 - b_rsff*u30 - f1*u36
-bi1_xx = u35 + u37
-u38 = b_fxey_turned + b_fyex_turned
-u39 = f1*u38
-bi1_xy = (-b_exey_turned*u28) - b_fxfy_turned*u30 - e1*u39
-bi1_xz = (-b_rex_turned*e1) - b_rfx_turned*f1
-u40 = b_fxex_turned*u33
-u41 = b_exex_turned*u28 + b_fxfx_turned*u30 + f1*u40
-bi1_yy = u37 + u41
-bi1_yz = (-b_rey_turned*e1) - b_rfy_turned*f1
-bi1_zz = u35 + u41
-u42 = 2.0*f1
-u43 = (-b_rsee*u33) - b_rsfe*u42
-u44 = b_eyey_turned*u33 + b_fyey_turned*u42
-u45 = (-u36) - b_rsff*u42
-u46 = u34 + b_fyfy_turned*u42
-bid1_xx = e1d*(u43 + u44) + f1d*(u45 + u46)
-bid1_xy = e1d*((-u39) - b_exey_turned*u33) + f1d*((-b_fxfy_turned*u42) - e1*u38)
-u47 = b_rex_turned*e1d + b_rfx_turned*f1d
-bid1_xz = -u47
-u48 = b_exex_turned*u33 + b_fxex_turned*u42
-u49 = u40 + b_fxfx_turned*u42
-bid1_yy = e1d*(u43 + u48) + f1d*(u45 + u49)
-u50 = b_rey_turned*e1d
-u51 = b_rfy_turned*f1d
-bid1_yz = (-u50) - u51
-bid1_zz = e1d*(u44 + u48) + f1d*(u46 + u49)
-u52 = 2.0*e1d
-u53 = 2.0*f1d
-blade1_whirl_x = b_ex_turned*u52 + b_fx_turned*u53 + bs1_z*won_y - bs1_y*lw_c1_z
-blade1_whirl_y = b_ey_turned*u52 + b_fy_turned*u53 + bs1_x*lw_c1_z - bs1_z*lw_c1_x
-u54 = (-u32) - b_see*e1
-u55 = (-b_sfe*e1) - b_sff*f1
-blade1_whirl_z = bs1_y*lw_c1_x + u52*u54 + u53*u55 - bs1_x*won_y
-blade1_momentum_x = bi1_xx*lw_c1_x + bi1_xy*won_y + bi1_xz*lw_c1_z - u50 - u51
-blade1_momentum_y = u47 + bi1_xy*lw_c1_x + bi1_yy*won_y + bi1_yz*lw_c1_z
-u56 = b_fyex_turned - b_fxey_turned
-u57 = e1*u56
-blade1_momentum_z = bi1_xz*lw_c1_x + bi1_yz*won_y + bi1_zz*lw_c1_z + f1d*u57 - e1d*f1*u56
-b_m = constants[0]
-blade1_force_x = b_m*lg_c1_x + blade1_whirl_z*won_y + bs1_z*hub_fullspin_y - blade1_whirl_y*lw_c1_z - bs1_y*lsp_c1_z
-blade1_force_y = b_m*hub_full_y + blade1_whirl_x*lw_c1_z + bs1_x*lsp_c1_z - blade1_whirl_z*lw_c1_x - bs1_z*lsp_c1_x
-blade1_force_z = b_m*lg_c1_z + blade1_whirl_y*lw_c1_x + bs1_y*lsp_c1_x - b_see*(e1d*e1d) - b_sfe*f1d*u52 - b_sff*(f1d*f1d) - blade1_whirl_x*won_y - bs1_x*hub_fullspin_y
-blade1_moment_x = bi1_xx*lsp_c1_x + bi1_xy*hub_fullspin_y + bi1_xz*lsp_c1_z + bid1_xx*lw_c1_x + bid1_xy*won_y + bid1_xz*lw_c1_z + blade1_momentum_z*won_y + bs1_y*lg_c1_z - blade1_momentum_y*lw_c1_z - bs1_z*hub_full_y
-blade1_moment_y = bi1_xy*lsp_c1_x + bi1_yy*hub_fullspin_y + bi1_yz*lsp_c1_z + bid1_xy*lw_c1_x + bid1_yy*won_y + bid1_yz*lw_c1_z + blade1_momentum_x*lw_c1_z + bs1_z*lg_c1_x - blade1_momentum_z*lw_c1_x - bs1_x*lg_c1_z
-blade1_moment_z = bi1_xz*lsp_c1_x + bi1_yz*hub_fullspin_y + bi1_zz*lsp_c1_z + bid1_xz*lw_c1_x + bid1_yz*won_y + bid1_zz*lw_c1_z + blade1_momentum_y*lw_c1_x + bs1_x*hub_full_y - blade1_momentum_x*won_y - bs1_y*lg_c1_x
-u58 = c_thrust*relative_x
-u59 = uniform_cos + uniform_mean
-e1dd = derivative[15]
-f1dd = derivative[12]
-blade1_net_x = pressure*(u58 + c_thrust_edge*e1d + c_thrust_flap*f1d + c_thrust_kappa*kappa_cos + c_thrust_skew*skew_cos + c_thrust_w*u59 + c_thrust_y*relative_y) - blade1_force_x - b_ex_turned*e1dd - b_fx_turned*f1dd
-u60 = c_tangential*relative_x
-blade1_net_y = pressure*((-u60) - c_tangential_edge*e1d - c_tangential_flap*f1d - c_tangential_kappa*kappa_cos - c_tangential_skew*skew_cos - c_tangential_w*u59 - c_tangential_y*relative_y) - blade1_force_y - b_ey_turned*e1dd - b_fy_turned*f1dd
-blade1_net_z = (-blade1_force_z) - e1dd*u54 - f1dd*u55
-u61 = c_torque*relative_x
-u62 = pressure*radius
-blade1_netm_x = b_rey_turned*e1dd + b_rfy_turned*f1dd + u62*(u61 + c_torque_edge*e1d + c_torque_flap*f1d + c_torque_kappa*kappa_cos + c_torque_skew*skew_cos + c_torque_w*u59 + c_torque_y*relative_y) - blade1_moment_x
-u63 = c_bending*relative_x
-blade1_netm_y = pressure*radius*(u63 + c_bending_edge*e1d + c_bending_flap*f1d + c_bending_kappa*kappa_cos + c_bending_skew*skew_cos + c_bending_w*u59 + c_bending_y*relative_y) - blade1_moment_y - b_rex_turned*e1dd - b_rfx_turned*f1dd
-blade1_netm_z = e1dd*f1*u56 - blade1_moment_z - f1dd*u57
-u64 = (0.5)*won_y
-half_sqrt3 = 0.8660254037844386
-u65 = half_sqrt3*won_z
-lw_2_y = u65 - u64
-u66 = (0.5)*won_z
-u67 = half_sqrt3*won_y
-lw_2_z = (-u66) - u67
-lw_c2_x = u21 - lw_2_z*sin_cone
-lw_c2_z = u22 + cos_cone*lw_2_z
-u68 = (0.5)*hub_full_y
-u69 = half_sqrt3*hub_full_z
-lg_2_y = u69 - u68
-u70 = (0.5)*hub_full_z
-u71 = half_sqrt3*hub_full_y
-lg_2_z = (-u70) - u71
-lg_c2_x = u23 - lg_2_z*sin_cone
-lg_c2_z = u24 + cos_cone*lg_2_z
-u72 = (0.5)*hub_fullspin_y
-u73 = half_sqrt3*hub_fullspin_z
-lsp_2_y = u73 - u72
-u74 = (0.5)*hub_fullspin_z
-u75 = half_sqrt3*hub_fullspin_y
-lsp_2_z = (-u74) - u75
-lsp_c2_x = u25 - lsp_2_z*sin_cone
-lsp_c2_z = u26 + cos_cone*lsp_2_z
-e2 = x[6]
 f2 = x[3]
-bs2_x = b_ex_turned*e2 + b_fx_turned*f2
-bs2_y = b_ey_turned*e2 + b_fy_turned*f2
-u76 = (e2*e2)
-u77 = (f2*f2)
-u78 = b_sfe*f2
-bs2_z = (-u27) - e2*u78 - u29*u76 - u31*u77
-u79 = 2.0*e2
-u80 = b_fyey_turned*u79
-u81 = b_eyey_turned*u76 + b_fyfy_turned*u77 + f2*u80
-u82 = b_rsfe*u79
-u83 = b_m2 - b_rsee*u76 - b_rsff*u77 - f2*u82
-bi2_xx = u81 + u83
-u84 = f2*u38
-bi2_xy = (-b_exey_turned*u76) - b_fxfy_turned*u77 - e2*u84
-bi2_xz = (-b_rex_turned*e2) - b_rfx_turned*f2
-u85 = b_fxex_turned*u79
-u86 = b_exex_turned*u76 + b_fxfx_turned*u77 + f2*u85
-bi2_yy = u83 + u86
-bi2_yz = (-b_rey_turned*e2) - b_rfy_turned*f2
-bi2_zz = u81 + u86
-u87 = 2.0*f2
-u88 = (-b_rsee*u79) - b_rsfe*u87
-u89 = b_eyey_turned*u79 + b_fyey_turned*u87
-u90 = (-u82) - b_rsff*u87
-u91 = u80 + b_fyfy_turned*u87
-bid2_xx = e2d*(u88 + u89) + f2d*(u90 + u91)
-bid2_xy = e2d*((-u84) - b_exey_turned*u79) + f2d*((-b_fxfy_turned*u87) - e2*u38)
-u92 = b_rex_turned*e2d + b_rfx_turned*f2d
-bid2_xz = -u92
-u93 = b_exex_turned*u79 + b_fxex_turned*u87
-u94 = u85 + b_fxfx_turned*u87
-bid2_yy = e2d*(u88 + u93) + f2d*(u90 + u94)
-u95 = b_rey_turned*e2d
-u96 = b_rfy_turned*f2d
-bid2_yz = (-u95) - u96
-bid2_zz = e2d*(u89 + u93) + f2d*(u91 + u94)
-u97 = 2.0*e2d
-u98 = 2.0*f2d
-blade2_whirl_x = b_ex_turned*u97 + b_fx_turned*u98 + bs2_z*lw_2_y - bs2_y*lw_c2_z
-blade2_whirl_y = b_ey_turned*u97 + b_fy_turned*u98 + bs2_x*lw_c2_z - bs2_z*lw_c2_x
-u99 = (-u78) - b_see*e2
-u100 = (-b_sfe*e2) - b_sff*f2
-blade2_whirl_z = bs2_y*lw_c2_x + u100*u98 + u97*u99 - bs2_x*lw_2_y
-blade2_momentum_x = bi2_xx*lw_c2_x + bi2_xy*lw_2_y + bi2_xz*lw_c2_z - u95 - u96
-blade2_momentum_y = u92 + bi2_xy*lw_c2_x + bi2_yy*lw_2_y + bi2_yz*lw_c2_z
-u101 = e2*u56
-blade2_momentum_z = bi2_xz*lw_c2_x + bi2_yz*lw_2_y + bi2_zz*lw_c2_z + f2d*u101 - e2d*f2*u56
-blade2_force_x = b_m*lg_c2_x + blade2_whirl_z*lw_2_y + bs2_z*lsp_2_y - blade2_whirl_y*lw_c2_z - bs2_y*lsp_c2_z
-blade2_force_y = b_m*lg_2_y + blade2_whirl_x*lw_c2_z + bs2_x*lsp_c2_z - blade2_whirl_z*lw_c2_x - bs2_z*lsp_c2_x
-blade2_force_z = b_m*lg_c2_z + blade2_whirl_y*lw_c2_x + bs2_y*lsp_c2_x - b_see*(e2d*e2d) - b_sfe*f2d*u97 - b_sff*(f2d*f2d) - blade2_whirl_x*lw_2_y - bs2_x*lsp_2_y
-blade2_moment_x = bi2_xx*lsp_c2_x + bi2_xy*lsp_2_y + bi2_xz*lsp_c2_z + bid2_xx*lw_c2_x + bid2_xy*lw_2_y + bid2_xz*lw_c2_z + blade2_momentum_z*lw_2_y + bs2_y*lg_c2_z - blade2_momentum_y*lw_c2_z - bs2_z*lg_2_y
-blade2_moment_y = bi2_xy*lsp_c2_x + bi2_yy*lsp_2_y + bi2_yz*lsp_c2_z + bid2_xy*lw_c2_x + bid2_yy*lw_2_y + bid2_yz*lw_c2_z + blade2_momentum_x*lw_c2_z + bs2_z*lg_c2_x - blade2_momentum_z*lw_c2_x - bs2_x*lg_c2_z
-blade2_moment_z = bi2_xz*lsp_c2_x + bi2_yz*lsp_2_y + bi2_zz*lsp_c2_z + bid2_xz*lw_c2_x + bid2_yz*lw_2_y + bid2_zz*lw_c2_z + blade2_momentum_y*lw_c2_x + bs2_x*lg_2_y - blade2_momentum_x*lw_2_y - bs2_y*lg_c2_x
-u102 = (0.5)*kappa_cos
-u103 = half_sqrt3*kappa_sin
-u104 = u103 - u102
-u105 = (0.5)*skew_cos
-u106 = half_sqrt3*skew_sin
-u107 = u106 - u105
-u108 = (0.5)*uniform_cos
-u109 = half_sqrt3*uniform_sin
-u110 = u109 + uniform_mean - u108
-u111 = (0.5)*relative_y
-u112 = half_sqrt3*relative_z
-u113 = u112 - u111
-e2dd = derivative[16]
-f2dd = derivative[13]
-blade2_net_x = pressure*(u58 + c_thrust_edge*e2d + c_thrust_flap*f2d + c_thrust_kappa*u104 + c_thrust_skew*u107 + c_thrust_w*u110 + c_thrust_y*u113) - blade2_force_x - b_ex_turned*e2dd - b_fx_turned*f2dd
-blade2_net_y = pressure*((-u60) - c_tangential_edge*e2d - c_tangential_flap*f2d - c_tangential_kappa*u104 - c_tangential_skew*u107 - c_tangential_w*u110 - c_tangential_y*u113) - blade2_force_y - b_ey_turned*e2dd - b_fy_turned*f2dd
-blade2_net_z = (-blade2_force_z) - e2dd*u99 - f2dd*u100
-blade2_netm_x = b_rey_turned*e2dd + b_rfy_turned*f2dd + u62*(u61 + c_torque_edge*e2d + c_torque_flap*f2d + c_torque_kappa*u104 + c_torque_skew*u107 + c_torque_w*u110 + c_torque_y*u113) - blade2_moment_x
-blade2_netm_y = pressure*radius*(u63 + c_bending_edge*e2d + c_bending_flap*f2d + c_bending_kappa*u104 + c_bending_skew*u107 + c_bending_w*u110 + c_bending_y*u113) - blade2_moment_y - b_rex_turned*e2dd - b_rfx_turned*f2dd
-blade2_netm_z = e2dd*f2*u56 - blade2_moment_z - f2dd*u101
-lw_3_y = (-u64) - u65
-lw_3_z = u67 - u66
-lw_c3_x = u21 - lw_3_z*sin_cone
-lw_c3_z = u22 + cos_cone*lw_3_z
-lg_3_y = (-u68) - u69
-lg_3_z = u71 - u70
-lg_c3_x = u23 - lg_3_z*sin_cone
-lg_c3_z = u24 + cos_cone*lg_3_z
-lsp_3_y = (-u72) - u73
-lsp_3_z = u75 - u74
-lsp_c3_x = u25 - lsp_3_z*sin_cone
-lsp_c3_z = u26 + cos_cone*lsp_3_z
-e3 = x[7]
 f3 = x[4]
-bs3_x = b_ex_turned*e3 + b_fx_turned*f3
-bs3_y = b_ey_turned*e3 + b_fy_turned*f3
-u114 = (e3*e3)
-u115 = (f3*f3)
-u116 = b_sfe*f3
-bs3_z = (-u27) - e3*u116 - u114*u29 - u115*u31
-u117 = 2.0*e3
-u118 = b_fyey_turned*u117
-u119 = b_eyey_turned*u114 + b_fyfy_turned*u115 + f3*u118
-u120 = b_rsfe*u117
-u121 = b_m2 - b_rsee*u114 - b_rsff*u115 - f3*u120
-bi3_xx = u119 + u121
-u122 = f3*u38
-bi3_xy = (-b_exey_turned*u114) - b_fxfy_turned*u115 - e3*u122
-bi3_xz = (-b_rex_turned*e3) - b_rfx_turned*f3
-u123 = b_fxex_turned*u117
-u124 = b_exex_turned*u114 + b_fxfx_turned*u115 + f3*u123
-bi3_yy = u121 + u124
-bi3_yz = (-b_rey_turned*e3) - b_rfy_turned*f3
-bi3_zz = u119 + u124
-u125 = 2.0*f3
-u126 = (-b_rsee*u117) - b_rsfe*u125
-u127 = b_eyey_turned*u117 + b_fyey_turned*u125
-u128 = (-u120) - b_rsff*u125
-u129 = u118 + b_fyfy_turned*u125
-bid3_xx = e3d*(u126 + u127) + f3d*(u128 + u129)
-bid3_xy = e3d*((-u122) - b_exey_turned*u117) + f3d*((-b_fxfy_turned*u125) - e3*u38)
-u130 = b_rex_turned*e3d + b_rfx_turned*f3d
-bid3_xz = -u130
-u131 = b_exex_turned*u117 + b_fxex_turned*u125
-u132 = u123 + b_fxfx_turned*u125
-bid3_yy = e3d*(u126 + u131) + f3d*(u128 + u132)
-u133 = b_rey_turned*e3d
-u134 = b_rfy_turned*f3d
-bid3_yz = (-u133) - u134
-bid3_zz = e3d*(u127 + u131) + f3d*(u129 + u132)
-u135 = 2.0*e3d
-u136 = 2.0*f3d
-blade3_whirl_x = b_ex_turned*u135 + b_fx_turned*u136 + bs3_z*lw_3_y - bs3_y*lw_c3_z
-blade3_whirl_y = b_ey_turned*u135 + b_fy_turned*u136 + bs3_x*lw_c3_z - bs3_z*lw_c3_x
-u137 = (-u116) - b_see*e3
-u138 = (-b_sfe*e3) - b_sff*f3
-blade3_whirl_z = bs3_y*lw_c3_x + u135*u137 + u136*u138 - bs3_x*lw_3_y
-blade3_momentum_x = bi3_xx*lw_c3_x + bi3_xy*lw_3_y + bi3_xz*lw_c3_z - u133 - u134
-blade3_momentum_y = u130 + bi3_xy*lw_c3_x + bi3_yy*lw_3_y + bi3_yz*lw_c3_z
-u139 = e3*u56
-blade3_momentum_z = bi3_xz*lw_c3_x + bi3_yz*lw_3_y + bi3_zz*lw_c3_z + f3d*u139 - e3d*f3*u56
-blade3_force_x = b_m*lg_c3_x + blade3_whirl_z*lw_3_y + bs3_z*lsp_3_y - blade3_whirl_y*lw_c3_z - bs3_y*lsp_c3_z
-blade3_force_y = b_m*lg_3_y + blade3_whirl_x*lw_c3_z + bs3_x*lsp_c3_z - blade3_whirl_z*lw_c3_x - bs3_z*lsp_c3_x
-blade3_force_z = b_m*lg_c3_z + blade3_whirl_y*lw_c3_x + bs3_y*lsp_c3_x - b_see*(e3d*e3d) - b_sfe*f3d*u135 - b_sff*(f3d*f3d) - blade3_whirl_x*lw_3_y - bs3_x*lsp_3_y
-blade3_moment_x = bi3_xx*lsp_c3_x + bi3_xy*lsp_3_y + bi3_xz*lsp_c3_z + bid3_xx*lw_c3_x + bid3_xy*lw_3_y + bid3_xz*lw_c3_z + blade3_momentum_z*lw_3_y + bs3_y*lg_c3_z - blade3_momentum_y*lw_c3_z - bs3_z*lg_3_y
-blade3_moment_y = bi3_xy*lsp_c3_x + bi3_yy*lsp_3_y + bi3_yz*lsp_c3_z + bid3_xy*lw_c3_x + bid3_yy*lw_3_y + bid3_yz*lw_c3_z + blade3_momentum_x*lw_c3_z + bs3_z*lg_c3_x - blade3_momentum_z*lw_c3_x - bs3_x*lg_c3_z
-blade3_moment_z = bi3_xz*lsp_c3_x + bi3_yz*lsp_3_y + bi3_zz*lsp_c3_z + bid3_xz*lw_c3_x + bid3_yz*lw_3_y + bid3_zz*lw_c3_z + blade3_momentum_y*lw_c3_x + bs3_x*lg_3_y - blade3_momentum_x*lw_3_y - bs3_y*lg_c3_x
-u140 = (-u102) - u103
-u141 = (-u105) - u106
-u142 = uniform_mean - u108 - u109
-u143 = (-u111) - u112
-e3dd = derivative[17]
-f3dd = derivative[14]
-blade3_net_x = pressure*(u58 + c_thrust_edge*e3d + c_thrust_flap*f3d + c_thrust_kappa*u140 + c_thrust_skew*u141 + c_thrust_w*u142 + c_thrust_y*u143) - blade3_force_x - b_ex_turned*e3dd - b_fx_turned*f3dd
-blade3_net_y = pressure*((-u60) - c_tangential_edge*e3d - c_tangential_flap*f3d - c_tangential_kappa*u140 - c_tangential_skew*u141 - c_tangential_w*u142 - c_tangential_y*u143) - blade3_force_y - b_ey_turned*e3dd - b_fy_turned*f3dd
-blade3_net_z = (-blade3_force_z) - e3dd*u137 - f3dd*u138
-blade3_netm_x = b_rey_turned*e3dd + b_rfy_turned*f3dd + u62*(u61 + c_torque_edge*e3d + c_torque_flap*f3d + c_torque_kappa*u140 + c_torque_skew*u141 + c_torque_w*u142 + c_torque_y*u143) - blade3_moment_x
-blade3_netm_y = pressure*radius*(u63 + c_bending_edge*e3d + c_bending_flap*f3d + c_bending_kappa*u140 + c_bending_skew*u141 + c_bending_w*u142 + c_bending_y*u143) - blade3_moment_y - b_rex_turned*e3dd - b_rfx_turned*f3dd
-blade3_netm_z = e3dd*f3*u56 - blade3_moment_z - f3dd*u139
-h_m = constants[43]
-rotor_force_x = blade1_net_x*cos_cone + blade1_net_z*sin_cone + blade2_net_x*cos_cone + blade2_net_z*sin_cone + blade3_net_x*cos_cone + blade3_net_z*sin_cone - h_m*hub_full_x
-rotor_force_y = blade1_net_y + half_sqrt3*(blade3_net_z*cos_cone - blade3_net_x*sin_cone) - (0.5)*blade2_net_y - (0.5)*blade3_net_y - h_m*hub_full_y - half_sqrt3*(blade2_net_z*cos_cone - blade2_net_x*sin_cone)
-rotor_force_z = blade1_net_z*cos_cone + (0.5)*blade2_net_x*sin_cone + blade2_net_y*half_sqrt3 + (0.5)*blade3_net_x*sin_cone - blade1_net_x*sin_cone - (0.5)*blade2_net_z*cos_cone - blade3_net_y*half_sqrt3 - (0.5)*blade3_net_z*cos_cone - h_m*hub_full_z
+f_mean = (0.3333333333333333)*f1 + (0.3333333333333333)*f2 + (0.3333333333333333)*f3
+f_cos = f1 - f_mean
+half_sqrt3 = 0.8660254037844386
+u21 = (0.5)/half_sqrt3
+f_sin = u21*(f2 - f3)
+f1d = x[12]
+f2d = x[13]
+f3d = x[14]
+d_mean = (0.3333333333333333)*f1d + (0.3333333333333333)*f2d + (0.3333333333333333)*f3d
+d_cos = f1d - d_mean
+d_sin = u21*(f2d - f3d)
+u22 = (f1*f1)
+ff_of_1 = u22
+u23 = (f2*f2)
+ff_of_2 = u23
+u24 = (f3*f3)
+ff_of_3 = u24
+ff_mean = (0.3333333333333333)*ff_of_1 + (0.3333333333333333)*ff_of_2 + (0.3333333333333333)*ff_of_3
+ff_cos = ff_of_1 - ff_mean
+ff_sin = u21*(ff_of_2 - ff_of_3)
+u25 = 2.0*f1
+fd_of_1 = f1d*u25
+u26 = 2.0*f2
+fd_of_2 = f2d*u26
+u27 = 2.0*f3
+fd_of_3 = f3d*u27
+fd_mean = (0.3333333333333333)*fd_of_1 + (0.3333333333333333)*fd_of_2 + (0.3333333333333333)*fd_of_3
+fd_cos = fd_of_1 - fd_mean
+fd_sin = u21*(fd_of_2 - fd_of_3)
+u28 = (f1d*f1d)
+dd_of_1 = u28
+u29 = (f2d*f2d)
+dd_of_2 = u29
+u30 = (f3d*f3d)
+dd_of_3 = u30
+dd_mean = (0.3333333333333333)*dd_of_1 + (0.3333333333333333)*dd_of_2 + (0.3333333333333333)*dd_of_3
+dd_cos = dd_of_1 - dd_mean
+dd_sin = u21*(dd_of_2 - dd_of_3)
+e1 = x[5]
+e2 = x[6]
+e3 = x[7]
+e_mean = (0.3333333333333333)*e1 + (0.3333333333333333)*e2 + (0.3333333333333333)*e3
+e_cos = e1 - e_mean
+e_sin = u21*(e2 - e3)
+e1d = x[15]
+e2d = x[16]
+e3d = x[17]
+g_mean = (0.3333333333333333)*e1d + (0.3333333333333333)*e2d + (0.3333333333333333)*e3d
+g_cos = e1d - g_mean
+g_sin = u21*(e2d - e3d)
+u31 = e1*f1
+ef_of_1 = u31
+u32 = e2*f2
+ef_of_2 = u32
+u33 = e3*f3
+ef_of_3 = u33
+ef_mean = (0.3333333333333333)*ef_of_1 + (0.3333333333333333)*ef_of_2 + (0.3333333333333333)*ef_of_3
+ef_cos = ef_of_1 - ef_mean
+ef_sin = u21*(ef_of_2 - ef_of_3)
+u34 = (e1*e1)
+ee_of_1 = u34
+u35 = (e2*e2)
+ee_of_2 = u35
+u36 = (e3*e3)
+ee_of_3 = u36
+ee_mean = (0.3333333333333333)*ee_of_1 + (0.3333333333333333)*ee_of_2 + (0.3333333333333333)*ee_of_3
+ee_cos = ee_of_1 - ee_mean
+ee_sin = u21*(ee_of_2 - ee_of_3)
+u37 = e1*f1d
+u38 = e1d*f1
+ef_rate_of_1 = u37 + u38
+u39 = e2*f2d
+u40 = e2d*f2
+ef_rate_of_2 = u39 + u40
+u41 = e3*f3d
+u42 = e3d*f3
+ef_rate_of_3 = u41 + u42
+ef_rate_mean = (0.3333333333333333)*ef_rate_of_1 + (0.3333333333333333)*ef_rate_of_2 + (0.3333333333333333)*ef_rate_of_3
+ef_rate_cos = ef_rate_of_1 - ef_rate_mean
+ef_rate_sin = u21*(ef_rate_of_2 - ef_rate_of_3)
+u43 = 2.0*e1
+eg_of_1 = e1d*u43
+u44 = 2.0*e2
+eg_of_2 = e2d*u44
+u45 = 2.0*e3
+eg_of_3 = e3d*u45
+eg_mean = (0.3333333333333333)*eg_of_1 + (0.3333333333333333)*eg_of_2 + (0.3333333333333333)*eg_of_3
+eg_cos = eg_of_1 - eg_mean
+eg_sin = u21*(eg_of_2 - eg_of_3)
+turn_of_1 = u37 - u38
+turn_of_2 = u39 - u40
+turn_of_3 = u41 - u42
+turn_mean = (0.3333333333333333)*turn_of_1 + (0.3333333333333333)*turn_of_2 + (0.3333333333333333)*turn_of_3
+turn_cos = turn_of_1 - turn_mean
+turn_sin = u21*(turn_of_2 - turn_of_3)
+u46 = e1d*f1d
+dg_of_1 = u46
+u47 = e2d*f2d
+dg_of_2 = u47
+u48 = e3d*f3d
+dg_of_3 = u48
+dg_mean = (0.3333333333333333)*dg_of_1 + (0.3333333333333333)*dg_of_2 + (0.3333333333333333)*dg_of_3
+dg_cos = dg_of_1 - dg_mean
+dg_sin = u21*(dg_of_2 - dg_of_3)
+u49 = (e1d*e1d)
+gg_of_1 = u49
+u50 = (e2d*e2d)
+gg_of_2 = u50
+u51 = (e3d*e3d)
+gg_of_3 = u51
+gg_mean = (0.3333333333333333)*gg_of_1 + (0.3333333333333333)*gg_of_2 + (0.3333333333333333)*gg_of_3
+gg_cos = gg_of_1 - gg_mean
+gg_sin = u21*(gg_of_2 - gg_of_3)
+l10 = constants[317]
+l5 = constants[312]
+l6 = constants[313]
+l9 = constants[316]
+rs_x = l10 + e_mean*k3_turned + f_mean*k6_turned - ee_mean*l5 - ef_mean*l6 - ff_mean*l9
+l15 = constants[322]
+l16 = constants[323]
+l21 = constants[328]
+rs_y = e_cos*k9_turned + e_sin*k10_turned + ee_sin*l15 + ef_sin*l16 + f_cos*k13_turned + f_sin*k14_turned + ff_sin*l21
+rs_z = e_sin*k9_turned + f_sin*k13_turned - e_cos*k10_turned - ee_cos*l15 - ef_cos*l16 - f_cos*k14_turned - ff_cos*l21
+rsd_x = d_mean*k6_turned + g_mean*k3_turned - ef_rate_mean*l6 - eg_mean*l5 - fd_mean*l9
+rsd_y = d_cos*k13_turned + d_sin*k14_turned + ef_rate_sin*l16 + eg_sin*l15 + fd_sin*l21 + g_cos*k9_turned + g_sin*k10_turned
+rsd_z = d_sin*k13_turned + g_sin*k9_turned - d_cos*k14_turned - ef_rate_cos*l16 - eg_cos*l15 - fd_cos*l21 - g_cos*k10_turned
+l22 = constants[329]
+l23 = constants[330]
+l24 = constants[331]
+rsdd_x = (-dd_mean*l22) - dg_mean*l23 - gg_mean*l24
+l25 = constants[332]
+l26 = constants[333]
+l27 = constants[334]
+rsdd_y = dd_sin*l25 + dg_sin*l26 + gg_sin*l27
+rsdd_z = (-dd_cos*l25) - dg_cos*l26 - gg_cos*l27
+l32 = constants[339]
+rl_x = (-d_mean*k22_turned) - g_mean*k23_turned - l32*turn_mean
+u52 = d_sin*k26_turned
+u53 = g_sin*k28_turned
+l41 = constants[348]
+rl_y = d_cos*k25_turned + g_cos*k27_turned + l41*turn_sin - u52 - u53
+u54 = d_cos*k26_turned + g_cos*k28_turned
+rl_z = u54 + d_sin*k25_turned + g_sin*k27_turned - l41*turn_cos
+l55 = constants[362]
+ri_xx = l55 + ee_mean*k31_turned + ef_mean*k32_turned + ff_mean*k34_turned - e_mean*k30_turned - f_mean*k33_turned
+ri_xy = e_sin*k36_turned + f_sin*k41_turned - e_cos*k28_turned - ee_cos*k37_turned - ee_sin*k38_turned - ef_cos*k39_turned - ef_sin*k40_turned - f_cos*k26_turned - ff_cos*k42_turned - ff_sin*k43_turned
+ri_xz = ee_cos*k38_turned + ef_cos*k40_turned + ff_cos*k43_turned - e_cos*k36_turned - e_sin*k28_turned - ee_sin*k37_turned - ef_sin*k39_turned - f_cos*k41_turned - f_sin*k26_turned - ff_sin*k42_turned
+ri_yz = e_sin*k45_turned + ee_cos*k46_turned + ee_sin*k47_turned + ef_cos*k48_turned + ef_sin*k49_turned + f_sin*k51_turned + ff_cos*k52_turned + ff_sin*k53_turned - e_cos*k44_turned - f_cos*k50_turned
+l111 = constants[418]
+ri_mean = l111 + e_mean*k54_turned + ee_mean*k55_turned + ef_mean*k56_turned + f_mean*k57_turned + ff_mean*k58_turned
+ri_difference = ee_sin*k46_turned + ef_sin*k48_turned + ff_sin*k52_turned - e_cos*k45_turned - e_sin*k44_turned - ee_cos*k47_turned - ef_cos*k49_turned - f_cos*k51_turned - f_sin*k50_turned - ff_cos*k53_turned
+ri_yy = ri_difference + ri_mean
+ri_zz = ri_mean - ri_difference
 h_ixx = constants[44]
-rotor_moment_x = blade1_netm_x*cos_cone + blade1_netm_z*sin_cone + blade2_netm_x*cos_cone + blade2_netm_z*sin_cone + blade3_netm_x*cos_cone + blade3_netm_z*sin_cone - h_ixx*hub_fullspin_x
+rih_xx = h_ixx + ri_xx
 h_itt = constants[45]
-rotor_moment_y = blade1_netm_y + h_itt*wf_x*won_z + half_sqrt3*(blade3_netm_z*cos_cone - blade3_netm_x*sin_cone) - (0.5)*blade2_netm_y - (0.5)*blade3_netm_y - h_itt*hub_fullspin_y - h_ixx*wf_x*won_z - half_sqrt3*(blade2_netm_z*cos_cone - blade2_netm_x*sin_cone)
-rotor_moment_z = blade1_netm_z*cos_cone + (0.5)*blade2_netm_x*sin_cone + blade2_netm_y*half_sqrt3 + (0.5)*blade3_netm_x*sin_cone + h_ixx*wf_x*won_y - blade1_netm_x*sin_cone - (0.5)*blade2_netm_z*cos_cone - blade3_netm_y*half_sqrt3 - (0.5)*blade3_netm_z*cos_cone - h_itt*hub_fullspin_z - h_itt*wf_x*won_y
-u144 = cos_phi*rotor_force_z + rotor_force_y*sin_phi
-rf_n_x = cos_tilt*rotor_force_x - sin_tilt*u144
-rf_n_y = cos_phi*rotor_force_y - rotor_force_z*sin_phi
-rf_n_z = cos_tilt*u144 + rotor_force_x*sin_tilt
-u145 = cos_phi*rotor_moment_z + rotor_moment_y*sin_phi
-rm_n_x = cos_tilt*rotor_moment_x - sin_tilt*u145
-rm_n_y = cos_phi*rotor_moment_y - rotor_moment_z*sin_phi
-rm_n_z = cos_tilt*u145 + rotor_moment_x*sin_tilt
+rih_yy = h_itt + ri_yy
+rih_zz = h_itt + ri_zz
+rid_xx = ef_rate_mean*k32_turned + eg_mean*k31_turned + fd_mean*k34_turned - d_mean*k33_turned - g_mean*k30_turned
+rid_xy = d_sin*k41_turned + g_sin*k36_turned - u54 - ef_rate_cos*k39_turned - ef_rate_sin*k40_turned - eg_cos*k37_turned - eg_sin*k38_turned - fd_cos*k42_turned - fd_sin*k43_turned
+rid_xz = ef_rate_cos*k40_turned + eg_cos*k38_turned + fd_cos*k43_turned - u52 - u53 - d_cos*k41_turned - ef_rate_sin*k39_turned - eg_sin*k37_turned - fd_sin*k42_turned - g_cos*k36_turned
+rid_yz = d_sin*k51_turned + ef_rate_cos*k48_turned + ef_rate_sin*k49_turned + eg_cos*k46_turned + eg_sin*k47_turned + fd_cos*k52_turned + fd_sin*k53_turned + g_sin*k45_turned - d_cos*k50_turned - g_cos*k44_turned
+rid_mean = d_mean*k57_turned + ef_rate_mean*k56_turned + eg_mean*k55_turned + fd_mean*k58_turned + g_mean*k54_turned
+rid_difference = ef_rate_sin*k48_turned + eg_sin*k46_turned + fd_sin*k52_turned - d_cos*k51_turned - d_sin*k50_turned - ef_rate_cos*k49_turned - eg_cos*k47_turned - fd_cos*k53_turned - g_cos*k45_turned - g_sin*k44_turned
+rid_yy = rid_difference + rid_mean
+rid_zz = rid_mean - rid_difference
+turning_x = rid_xx*wf_x + rid_xy*won_y + rid_xz*won_z
+turning_y = rid_xy*wf_x + rid_yy*won_y + rid_yz*won_z
+turning_z = rid_xz*wf_x + rid_yz*won_y + rid_zz*won_z
+rot_whirl_x = rs_z*won_y + 2.0*rsd_x - rs_y*won_z
+rot_whirl_y = rs_x*won_z + 2.0*rsd_y - rs_z*wf_x
+rot_whirl_z = rs_y*wf_x + 2.0*rsd_z - rs_x*won_y
+rot_momentum_x = rl_x + ri_xy*won_y + ri_xz*won_z + rih_xx*wf_x
+rot_momentum_y = rl_y + ri_xy*wf_x + ri_yz*won_z + rih_yy*won_y
+rot_momentum_z = rl_z + ri_xz*wf_x + ri_yz*won_y + rih_zz*won_z
+l112 = constants[419]
+rot_force_x = rsdd_x + acc_f_s_x*l112 + rot_whirl_z*won_y + rs_z*spin_h_y - rot_whirl_y*won_z - rs_y*spin_h_z
+rot_force_y = rsdd_y + acc_f_y*l112 + rot_whirl_x*won_z + rs_x*spin_h_z - rot_whirl_z*wf_x - rs_z*spin_f_s_x
+rot_force_z = rsdd_z + acc_f_z*l112 + rot_whirl_y*wf_x + rs_y*spin_f_s_x - rot_whirl_x*won_y - rs_x*spin_h_y
+rot_moment_x = turning_x + acc_f_z*rs_y + ri_xy*spin_h_y + ri_xz*spin_h_z + rih_xx*spin_f_s_x + rot_momentum_z*won_y - acc_f_y*rs_z - rot_momentum_y*won_z
+rot_moment_y = turning_y + acc_f_s_x*rs_z + ri_xy*spin_f_s_x + ri_yz*spin_h_z + rih_yy*spin_h_y + rot_momentum_x*won_z - acc_f_z*rs_x - rot_momentum_z*wf_x
+rot_moment_z = turning_z + acc_f_y*rs_x + ri_xz*spin_f_s_x + ri_yz*spin_h_y + rih_zz*spin_h_z + rot_momentum_y*wf_x - acc_f_s_x*rs_y - rot_momentum_x*won_y
 n_y = constants[50]
 n_z = constants[51]
-nacl_ta_x = ta_x + n_z*wa_y - n_y*wa_z
+u55 = ta_x + n_z*wa_y - n_y*wa_z
+nac_ta_x = u55
 n_x = constants[49]
-nacl_ta_y = ta_y + n_x*wa_z
-nacl_ta_z = (-u11) - n_x*wa_y
-nacl_ts_y = ts_y + n_z*t_slope_ss
-nacl_ts_z = ts_z - n_y*t_slope_ss
-u146 = n_y*wn_x - n_x*wn_y
-u147 = n_x*wn_z - n_z*wn_x
-nacl_acc_x = top_x + n_z*spin_n_y + u146*wn_y - n_y*spin_n_z - u147*wn_z
-u148 = n_z*wn_y - n_y*wn_z
-nacl_acc_y = top_y + n_x*spin_n_z + u148*wn_z - u146*wn_x
-nacl_acc_z = u147*wn_x - u16 - n_x*spin_n_y - u148*wn_y
-nacl_full_x = nacl_acc_x + add*nacl_ta_x + sdd*ts_x
-nacl_full_y = nacl_acc_y + add*nacl_ta_y + nacl_ts_y*sdd
-nacl_full_z = nacl_acc_z + add*nacl_ta_z + nacl_ts_z*sdd
-nacl_fullspin_x = -sdd*t_slope_ss
-nacl_fullspin_y = spin_n_y + add*wa_y
-nacl_fullspin_z = spin_n_z + add*wa_z
-n_m = constants[48]
-nac_force_x = -n_m*nacl_full_x
-nac_force_y = -n_m*nacl_full_y
-nac_force_z = -n_m*nacl_full_z
-top_force_x = nac_force_x + rf_n_x
-top_force_y = nac_force_y + rf_n_y
-top_force_z = nac_force_z + rf_n_z
-g_i = constants[55]
-gendd = derivative[19]
-u149 = g_i*gendd
-n_ixx = constants[52]
+u56 = ta_y + n_x*wa_z
+nac_ta_y = u56
+u57 = (-u11) - n_x*wa_y
+nac_ta_z = u57
+u58 = ts_y + n_z*t_slope_ss
+nac_ts_y = u58
+u59 = ts_z - n_y*t_slope_ss
+nac_ts_z = u59
+u60 = n_y*wn_x - n_x*wn_y
+u61 = n_x*wn_z - n_z*wn_x
+u62 = top_x + n_z*spin_n_y + u60*wn_y - n_y*spin_n_z - u61*wn_z
+nac_acc_x = u62
+u63 = n_z*wn_y - n_y*wn_z
+u64 = top_y + n_x*spin_n_z + u63*wn_z - u60*wn_x
+nac_acc_y = u64
+u65 = u61*wn_x - u16 - n_x*spin_n_y - u63*wn_y
+nac_acc_z = u65
 n_iyy = constants[53]
+u66 = n_iyy*u15
 n_izz = constants[54]
-top_moment_x = rm_n_x + n_iyy*wn_y*wn_z + n_y*nac_force_z - cos_tilt*u149 - l1*rf_n_y - n_ixx*nacl_fullspin_x - n_izz*u15 - n_z*nac_force_y
-top_moment_y = rm_n_y + l1*rf_n_x + n_izz*wn_x*wn_z + n_z*nac_force_x - l0*rf_n_z - n_ixx*wn_x*wn_z - n_iyy*nacl_fullspin_y - n_x*nac_force_z
-top_moment_z = rm_n_z + l0*rf_n_y + n_ixx*wn_x*wn_y + n_x*nac_force_y - n_iyy*u14 - n_izz*nacl_fullspin_z - n_y*nac_force_x - sin_tilt*u149
-u150 = roll_cos*top_force_z + roll_sin*top_force_y
-base_force_x = pitch_cos*top_force_x + pitch_sin*u150
-base_force_y = roll_cos*top_force_y - roll_sin*top_force_z
-base_force_z = pitch_cos*u150 - pitch_sin*top_force_x
+u67 = n_izz*u15
+nac_moment_x = u67 - u66
+u68 = wn_x*wn_z
+n_ixx = constants[52]
+u69 = n_ixx*u68 - n_izz*u68
+nac_moment_y = u69 + n_iyy*spin_n_y
+u70 = n_iyy*u14 - n_ixx*u14
+nac_moment_z = u70 + n_izz*spin_n_z
+l115 = constants[422]
+pressure_x = l115*pressure
+pressure_yz = (1.5)*pressure
+pressure_rx = pressure_x*radius
+pressure_ryz = pressure_yz*radius
+u71 = c_thrust*relative_x
+aero_force_x = pressure_x*(u71 + c_thrust_edge*g_mean + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
+u72 = c_tangential_kappa*kappa_cos + c_tangential_skew*skew_cos + c_tangential_y*relative_y
+sin_cone = constants[40]
+aero_force_y = pressure_yz*(sin_cone*(c_thrust_edge*g_sin + c_thrust_flap*d_sin + c_thrust_kappa*kappa_sin + c_thrust_skew*skew_sin + c_thrust_w*uniform_sin + c_thrust_y*relative_z) - u72 - c_tangential_edge*g_cos - c_tangential_flap*d_cos - c_tangential_w*uniform_cos)
+u73 = c_thrust_kappa*kappa_cos + c_thrust_skew*skew_cos + c_thrust_y*relative_y
+aero_force_z = pressure_yz*((-c_tangential_edge*g_sin) - c_tangential_flap*d_sin - c_tangential_kappa*kappa_sin - c_tangential_skew*skew_sin - c_tangential_w*uniform_sin - c_tangential_y*relative_z - sin_cone*(u73 + c_thrust_edge*g_cos + c_thrust_flap*d_cos + c_thrust_w*uniform_cos))
+u74 = c_torque*relative_x
+aero_moment_x = pressure_rx*(u74 + c_torque_edge*g_mean + c_torque_flap*d_mean + c_torque_w*uniform_mean)
+u75 = c_bending_kappa*kappa_cos + c_bending_skew*skew_cos + c_bending_y*relative_y
+aero_moment_y = pressure_ryz*(u75 + c_bending_edge*g_cos + c_bending_flap*d_cos + c_bending_w*uniform_cos + sin_cone*(c_torque_edge*g_sin + c_torque_flap*d_sin + c_torque_kappa*kappa_sin + c_torque_skew*skew_sin + c_torque_w*uniform_sin + c_torque_y*relative_z))
+u76 = c_torque_kappa*kappa_cos + c_torque_skew*skew_cos + c_torque_y*relative_y
+aero_moment_z = pressure_ryz*(c_bending_edge*g_sin + c_bending_flap*d_sin + c_bending_kappa*kappa_sin + c_bending_skew*skew_sin + c_bending_w*uniform_sin + c_bending_y*relative_z - sin_cone*(u76 + c_torque_edge*g_cos + c_torque_flap*d_cos + c_torque_w*uniform_cos))
+net_force_x = aero_force_x - rot_force_x
+net_force_y = aero_force_y - rot_force_y
+net_force_z = aero_force_z - rot_force_z
+net_moment_x = aero_moment_x - rot_moment_x
+net_moment_y = aero_moment_y - rot_moment_y
+net_moment_z = aero_moment_z - rot_moment_z
 gend = x[19]
 tg_k = constants[81]
 torque_optimal = (gend*gend)*tg_k
@@ -2139,19 +2671,607 @@ tg_a2 = constants[82]
 tg_t2 = constants[84]
 tg_ws = constants[83]
 torque_rise = tg_t2 + tg_a2*(gend - tg_ws) - torque_optimal
-l3 = constants[310]
-torque_below = torque_optimal + (0.5)*torque_rise + (0.5)*sqrt(l3 + (torque_rise*torque_rise))
-u151 = -torque_below
+l116 = constants[423]
+torque_below = torque_optimal + (0.5)*torque_rise + (0.5)*sqrt(l116 + (torque_rise*torque_rise))
+u77 = -torque_below
 tg_p = constants[85]
 tg_t = constants[86]
-torque_excess = (-tg_t) - u151 - tg_p/(gend + 1e-100)
-torque_gen = (-u151) - (0.5)*torque_excess - (0.5)*sqrt(l3 + (torque_excess*torque_excess))
+torque_excess = (-tg_t) - u77 - tg_p/(gend + 1e-100)
+torque_gen = (-u77) - (0.5)*torque_excess - (0.5)*sqrt(l116 + (torque_excess*torque_excess))
 d_d = constants[60]
 d_k = constants[59]
 gen = x[9]
-l4 = constants[311]
-l5 = constants[312]
-torque_shaft = d_d*(phid - gend*l4) + d_k*(phi - gen*l4) + l5*torque_gen
+l117 = constants[424]
+l118 = constants[425]
+torque_shaft = d_d*(phid - gend*l117) + d_k*(phi - gen*l117) + l118*torque_gen
+mom_a_x = l112*tha_s_x + rs_z*wha_y - rs_y*wha_z
+mom_a_y = l112*tha_y + rs_x*wha_z - rs_z*wha_s_x
+mom_a_z = l112*tha_z + rs_y*wha_s_x - rs_x*wha_y
+ang_a_x = ri_xy*wha_y + ri_xz*wha_z + rih_xx*wha_s_x + rs_y*tha_z - rs_z*tha_y
+ang_a_y = ri_xy*wha_s_x + ri_yz*wha_z + rih_yy*wha_y + rs_z*tha_s_x - rs_x*tha_z
+ang_a_z = ri_xz*wha_s_x + ri_yz*wha_y + rih_zz*wha_z + rs_x*tha_y - rs_y*tha_s_x
+mom_s_x = l112*ths_s_x + rs_z*whs_y - rs_y*whs_z
+mom_s_y = l112*ths_y + rs_x*whs_z - rs_z*whs_s_x
+mom_s_z = l112*ths_z + rs_y*whs_s_x - rs_x*whs_y
+ang_s_x = ri_xy*whs_y + ri_xz*whs_z + rih_xx*whs_s_x + rs_y*ths_z - rs_z*ths_y
+ang_s_y = ri_xy*whs_s_x + ri_yz*whs_z + rih_yy*whs_y + rs_z*ths_s_x - rs_x*ths_z
+ang_s_z = ri_xz*whs_s_x + ri_yz*whs_y + rih_zz*whs_z + rs_x*ths_y - rs_y*ths_s_x
+l122 = constants[429]
+gyro_mean = -l122*wf_x
+l123 = constants[430]
+gyro_cos = -l123*won_z
+gyro_sin = l123*won_y
+gyro_other = gyro_mean - (0.5)*gyro_cos
+gyro_1 = gyro_cos + gyro_mean
+u78 = gyro_sin*half_sqrt3
+gyro_2 = gyro_other + u78
+gyro_3 = gyro_other - u78
+w_xx = (wf_x*wf_x)
+u79 = wf_x*won_y
+w_xy = u79
+u80 = wf_x*won_z
+w_xz = u80
+w_yz = won_y*won_z
+w_yy = (won_y*won_y)
+w_zz = (won_z*won_z)
+u81 = (0.5)*w_yy
+u82 = (0.5)*w_zz
+w_mean = u81 + u82
+w_diff = u81 - u82
+q_f_fixed_mean = k73_turned*spin_f_s_x + k82_turned*w_mean + pressure*(c_flap*relative_x + c_flap_w*uniform_mean) - acc_f_s_x*k72_turned - k82_turned*w_xx
+q_f_fixed_cos = acc_f_z*k74_turned + pressure*(c_flap_kappa*kappa_cos + c_flap_skew*skew_cos + c_flap_w*uniform_cos + c_flap_y*relative_y) - acc_f_y*b_fy_turned - b_rfx_turned*spin_h_y - k73_turned*w_yz - k75_turned*spin_h_z - k75_turned*w_xy - k82_turned*w_diff - k83_turned*w_xz
+q_f_fixed_sin = k75_turned*spin_h_y + k82_turned*w_yz + k83_turned*w_xy + pressure*(c_flap_kappa*kappa_sin + c_flap_skew*skew_sin + c_flap_w*uniform_sin + c_flap_y*relative_z) - acc_f_y*k74_turned - acc_f_z*b_fy_turned - b_rfx_turned*spin_h_z - k73_turned*w_diff - k75_turned*w_xz
+q_f_fixed_other = q_f_fixed_mean - (0.5)*q_f_fixed_cos
+q_f_fixed_1 = q_f_fixed_cos + q_f_fixed_mean
+u83 = half_sqrt3*q_f_fixed_sin
+q_f_fixed_2 = q_f_fixed_other + u83
+q_f_fixed_3 = q_f_fixed_other - u83
+b_kf = constants[27]
+l132 = constants[439]
+q_f_by_flap_mean = acc_f_s_x*l132 + k84_turned*w_xx + k85_turned*w_mean - b_kf
+l133 = constants[440]
+q_f_by_flap_cos = acc_f_z*l133 + k87_turned*w_xz + k88_turned*w_yz - k86_turned*w_xy - k89_turned*w_diff
+q_f_by_flap_sin = k88_turned*w_diff + k89_turned*w_yz - acc_f_y*l133 - k86_turned*w_xz - k87_turned*w_xy
+q_f_by_flap_other = q_f_by_flap_mean - (0.5)*q_f_by_flap_cos
+q_f_by_flap_1 = q_f_by_flap_cos + q_f_by_flap_mean
+u84 = half_sqrt3*q_f_by_flap_sin
+q_f_by_flap_2 = q_f_by_flap_other + u84
+q_f_by_flap_3 = q_f_by_flap_other - u84
+l135 = constants[442]
+u85 = l135*spin_f_s_x
+b_kfe = constants[29]
+l134 = constants[441]
+u86 = acc_f_s_x*l134 + k90_turned*w_xx + k91_turned*w_mean - b_kfe
+q_f_by_edge_mean = u85 + u86
+l137 = constants[444]
+u87 = l137*spin_h_z
+l136 = constants[443]
+u88 = acc_f_z*l136 + k93_turned*w_xz + k94_turned*w_yz - k92_turned*w_xy - k95_turned*w_diff
+q_f_by_edge_cos = u87 + u88
+u89 = l137*spin_h_y
+u90 = acc_f_y*l136 + k92_turned*w_xz + k93_turned*w_xy - k94_turned*w_diff - k95_turned*w_yz
+q_f_by_edge_sin = (-u89) - u90
+q_f_by_edge_other = q_f_by_edge_mean - (0.5)*q_f_by_edge_cos
+q_f_by_edge_1 = q_f_by_edge_cos + q_f_by_edge_mean
+u91 = half_sqrt3*q_f_by_edge_sin
+q_f_by_edge_2 = q_f_by_edge_other + u91
+q_f_by_edge_3 = q_f_by_edge_other - u91
+b_df = constants[30]
+flap_flap = c_flap_flap*pressure - b_df
+flap_edge = c_flap_edge*pressure
+q_f1 = q_f_fixed_1 + e1*q_f_by_edge_1 + e1d*flap_edge + f1*q_f_by_flap_1 + f1d*flap_flap - e1d*gyro_1
+q_f2 = q_f_fixed_2 + e2*q_f_by_edge_2 + e2d*flap_edge + f2*q_f_by_flap_2 + f2d*flap_flap - e2d*gyro_2
+q_f3 = q_f_fixed_3 + e3*q_f_by_edge_3 + e3d*flap_edge + f3*q_f_by_flap_3 + f3d*flap_flap - e3d*gyro_3
+q_e_fixed_mean = k102_turned*w_mean + k97_turned*spin_f_s_x + pressure*(c_edge*relative_x + c_edge_w*uniform_mean) - acc_f_s_x*k96_turned - k102_turned*w_xx
+q_e_fixed_cos = acc_f_z*k98_turned + pressure*(c_edge_kappa*kappa_cos + c_edge_skew*skew_cos + c_edge_w*uniform_cos + c_edge_y*relative_y) - acc_f_y*b_ey_turned - b_rex_turned*spin_h_y - k102_turned*w_diff - k103_turned*w_xz - k97_turned*w_yz - k99_turned*spin_h_z - k99_turned*w_xy
+q_e_fixed_sin = k102_turned*w_yz + k103_turned*w_xy + k99_turned*spin_h_y + pressure*(c_edge_kappa*kappa_sin + c_edge_skew*skew_sin + c_edge_w*uniform_sin + c_edge_y*relative_z) - acc_f_y*k98_turned - acc_f_z*b_ey_turned - b_rex_turned*spin_h_z - k97_turned*w_diff - k99_turned*w_xz
+q_e_fixed_other = q_e_fixed_mean - (0.5)*q_e_fixed_cos
+q_e_fixed_1 = q_e_fixed_cos + q_e_fixed_mean
+u92 = half_sqrt3*q_e_fixed_sin
+q_e_fixed_2 = q_e_fixed_other + u92
+q_e_fixed_3 = q_e_fixed_other - u92
+q_e_by_flap_mean = u86 - u85
+q_e_by_flap_cos = u88 - u87
+q_e_by_flap_sin = u89 - u90
+q_e_by_flap_other = q_e_by_flap_mean - (0.5)*q_e_by_flap_cos
+q_e_by_flap_1 = q_e_by_flap_cos + q_e_by_flap_mean
+u93 = half_sqrt3*q_e_by_flap_sin
+q_e_by_flap_2 = q_e_by_flap_other + u93
+q_e_by_flap_3 = q_e_by_flap_other - u93
+b_ke = constants[28]
+l182 = constants[489]
+q_e_by_edge_mean = acc_f_s_x*l182 + k104_turned*w_xx + k105_turned*w_mean - b_ke
+l183 = constants[490]
+q_e_by_edge_cos = acc_f_z*l183 + k107_turned*w_xz + k108_turned*w_yz - k106_turned*w_xy - k109_turned*w_diff
+q_e_by_edge_sin = k108_turned*w_diff + k109_turned*w_yz - acc_f_y*l183 - k106_turned*w_xz - k107_turned*w_xy
+q_e_by_edge_other = q_e_by_edge_mean - (0.5)*q_e_by_edge_cos
+q_e_by_edge_1 = q_e_by_edge_cos + q_e_by_edge_mean
+u94 = half_sqrt3*q_e_by_edge_sin
+q_e_by_edge_2 = q_e_by_edge_other + u94
+q_e_by_edge_3 = q_e_by_edge_other - u94
+edge_flap = c_edge_flap*pressure
+b_de = constants[31]
+edge_edge = c_edge_edge*pressure - b_de
+q_e1 = q_e_fixed_1 + e1*q_e_by_edge_1 + e1d*edge_edge + edge_flap*f1d + f1*q_e_by_flap_1 + f1d*gyro_1
+q_e2 = q_e_fixed_2 + e2*q_e_by_edge_2 + e2d*edge_edge + edge_flap*f2d + f2*q_e_by_flap_2 + f2d*gyro_2
+q_e3 = q_e_fixed_3 + e3*q_e_by_edge_3 + e3d*edge_edge + edge_flap*f3d + f3*q_e_by_flap_3 + f3d*gyro_3
+m_f_a_fixed_mean = k72_turned*tha_s_x - k73_turned*wha_s_x
+m_f_a_fixed_cos = b_fy_turned*tha_y + b_rfx_turned*wha_y + k75_turned*wha_z - k74_turned*tha_z
+m_f_a_fixed_sin = b_fy_turned*tha_z + b_rfx_turned*wha_z + k74_turned*tha_y - k75_turned*wha_y
+m_f_a_fixed_other = m_f_a_fixed_mean - (0.5)*m_f_a_fixed_cos
+m_f_a_fixed_1 = m_f_a_fixed_cos + m_f_a_fixed_mean
+u95 = half_sqrt3*m_f_a_fixed_sin
+m_f_a_fixed_2 = m_f_a_fixed_other + u95
+m_f_a_fixed_3 = m_f_a_fixed_other - u95
+m_f_a_by_flap_mean = -l132*tha_s_x
+m_f_a_by_flap_cos = -l133*tha_z
+m_f_a_by_flap_sin = l133*tha_y
+m_f_a_by_flap_other = m_f_a_by_flap_mean - (0.5)*m_f_a_by_flap_cos
+m_f_a_by_flap_1 = m_f_a_by_flap_cos + m_f_a_by_flap_mean
+u96 = half_sqrt3*m_f_a_by_flap_sin
+m_f_a_by_flap_2 = m_f_a_by_flap_other + u96
+m_f_a_by_flap_3 = m_f_a_by_flap_other - u96
+u97 = l134*tha_s_x
+u98 = l135*wha_s_x
+m_f_a_by_edge_mean = (-u97) - u98
+u99 = l136*tha_z
+u100 = l137*wha_z
+m_f_a_by_edge_cos = (-u100) - u99
+u101 = l136*tha_y
+u102 = l137*wha_y
+m_f_a_by_edge_sin = u101 + u102
+m_f_a_by_edge_other = m_f_a_by_edge_mean - (0.5)*m_f_a_by_edge_cos
+m_f_a_by_edge_1 = m_f_a_by_edge_cos + m_f_a_by_edge_mean
+u103 = half_sqrt3*m_f_a_by_edge_sin
+m_f_a_by_edge_2 = m_f_a_by_edge_other + u103
+m_f_a_by_edge_3 = m_f_a_by_edge_other - u103
+m_f1a = m_f_a_fixed_1 + e1*m_f_a_by_edge_1 + f1*m_f_a_by_flap_1
+m_f2a = m_f_a_fixed_2 + e2*m_f_a_by_edge_2 + f2*m_f_a_by_flap_2
+m_f3a = m_f_a_fixed_3 + e3*m_f_a_by_edge_3 + f3*m_f_a_by_flap_3
+m_e_a_fixed_mean = k96_turned*tha_s_x - k97_turned*wha_s_x
+m_e_a_fixed_cos = b_ey_turned*tha_y + b_rex_turned*wha_y + k99_turned*wha_z - k98_turned*tha_z
+m_e_a_fixed_sin = b_ey_turned*tha_z + b_rex_turned*wha_z + k98_turned*tha_y - k99_turned*wha_y
+m_e_a_fixed_other = m_e_a_fixed_mean - (0.5)*m_e_a_fixed_cos
+m_e_a_fixed_1 = m_e_a_fixed_cos + m_e_a_fixed_mean
+u104 = half_sqrt3*m_e_a_fixed_sin
+m_e_a_fixed_2 = m_e_a_fixed_other + u104
+m_e_a_fixed_3 = m_e_a_fixed_other - u104
+m_e_a_by_flap_mean = u98 - u97
+m_e_a_by_flap_cos = u100 - u99
+m_e_a_by_flap_sin = u101 - u102
+m_e_a_by_flap_other = m_e_a_by_flap_mean - (0.5)*m_e_a_by_flap_cos
+m_e_a_by_flap_1 = m_e_a_by_flap_cos + m_e_a_by_flap_mean
+u105 = half_sqrt3*m_e_a_by_flap_sin
+m_e_a_by_flap_2 = m_e_a_by_flap_other + u105
+m_e_a_by_flap_3 = m_e_a_by_flap_other - u105
+m_e_a_by_edge_mean = -l182*tha_s_x
+m_e_a_by_edge_cos = -l183*tha_z
+m_e_a_by_edge_sin = l183*tha_y
+m_e_a_by_edge_other = m_e_a_by_edge_mean - (0.5)*m_e_a_by_edge_cos
+m_e_a_by_edge_1 = m_e_a_by_edge_cos + m_e_a_by_edge_mean
+u106 = half_sqrt3*m_e_a_by_edge_sin
+m_e_a_by_edge_2 = m_e_a_by_edge_other + u106
+m_e_a_by_edge_3 = m_e_a_by_edge_other - u106
+m_e1a = m_e_a_fixed_1 + e1*m_e_a_by_edge_1 + f1*m_e_a_by_flap_1
+m_e2a = m_e_a_fixed_2 + e2*m_e_a_by_edge_2 + f2*m_e_a_by_flap_2
+m_e3a = m_e_a_fixed_3 + e3*m_e_a_by_edge_3 + f3*m_e_a_by_flap_3
+m_f_s_fixed_mean = k72_turned*ths_s_x - k73_turned*whs_s_x
+m_f_s_fixed_cos = b_fy_turned*ths_y + b_rfx_turned*whs_y + k75_turned*whs_z - k74_turned*ths_z
+m_f_s_fixed_sin = b_fy_turned*ths_z + b_rfx_turned*whs_z + k74_turned*ths_y - k75_turned*whs_y
+m_f_s_fixed_other = m_f_s_fixed_mean - (0.5)*m_f_s_fixed_cos
+m_f_s_fixed_1 = m_f_s_fixed_cos + m_f_s_fixed_mean
+u107 = half_sqrt3*m_f_s_fixed_sin
+m_f_s_fixed_2 = m_f_s_fixed_other + u107
+m_f_s_fixed_3 = m_f_s_fixed_other - u107
+m_f_s_by_flap_mean = -l132*ths_s_x
+m_f_s_by_flap_cos = -l133*ths_z
+m_f_s_by_flap_sin = l133*ths_y
+m_f_s_by_flap_other = m_f_s_by_flap_mean - (0.5)*m_f_s_by_flap_cos
+m_f_s_by_flap_1 = m_f_s_by_flap_cos + m_f_s_by_flap_mean
+u108 = half_sqrt3*m_f_s_by_flap_sin
+m_f_s_by_flap_2 = m_f_s_by_flap_other + u108
+m_f_s_by_flap_3 = m_f_s_by_flap_other - u108
+u109 = l134*ths_s_x
+u110 = l135*whs_s_x
+m_f_s_by_edge_mean = (-u109) - u110
+u111 = l136*ths_z
+u112 = l137*whs_z
+m_f_s_by_edge_cos = (-u111) - u112
+u113 = l136*ths_y
+u114 = l137*whs_y
+m_f_s_by_edge_sin = u113 + u114
+m_f_s_by_edge_other = m_f_s_by_edge_mean - (0.5)*m_f_s_by_edge_cos
+m_f_s_by_edge_1 = m_f_s_by_edge_cos + m_f_s_by_edge_mean
+u115 = half_sqrt3*m_f_s_by_edge_sin
+m_f_s_by_edge_2 = m_f_s_by_edge_other + u115
+m_f_s_by_edge_3 = m_f_s_by_edge_other - u115
+m_f1s = m_f_s_fixed_1 + e1*m_f_s_by_edge_1 + f1*m_f_s_by_flap_1
+m_f2s = m_f_s_fixed_2 + e2*m_f_s_by_edge_2 + f2*m_f_s_by_flap_2
+m_f3s = m_f_s_fixed_3 + e3*m_f_s_by_edge_3 + f3*m_f_s_by_flap_3
+m_e_s_fixed_mean = k96_turned*ths_s_x - k97_turned*whs_s_x
+m_e_s_fixed_cos = b_ey_turned*ths_y + b_rex_turned*whs_y + k99_turned*whs_z - k98_turned*ths_z
+m_e_s_fixed_sin = b_ey_turned*ths_z + b_rex_turned*whs_z + k98_turned*ths_y - k99_turned*whs_y
+m_e_s_fixed_other = m_e_s_fixed_mean - (0.5)*m_e_s_fixed_cos
+m_e_s_fixed_1 = m_e_s_fixed_cos + m_e_s_fixed_mean
+u116 = half_sqrt3*m_e_s_fixed_sin
+m_e_s_fixed_2 = m_e_s_fixed_other + u116
+m_e_s_fixed_3 = m_e_s_fixed_other - u116
+m_e_s_by_flap_mean = u110 - u109
+m_e_s_by_flap_cos = u112 - u111
+m_e_s_by_flap_sin = u113 - u114
+m_e_s_by_flap_other = m_e_s_by_flap_mean - (0.5)*m_e_s_by_flap_cos
+m_e_s_by_flap_1 = m_e_s_by_flap_cos + m_e_s_by_flap_mean
+u117 = half_sqrt3*m_e_s_by_flap_sin
+m_e_s_by_flap_2 = m_e_s_by_flap_other + u117
+m_e_s_by_flap_3 = m_e_s_by_flap_other - u117
+m_e_s_by_edge_mean = -l182*ths_s_x
+m_e_s_by_edge_cos = -l183*ths_z
+m_e_s_by_edge_sin = l183*ths_y
+m_e_s_by_edge_other = m_e_s_by_edge_mean - (0.5)*m_e_s_by_edge_cos
+m_e_s_by_edge_1 = m_e_s_by_edge_cos + m_e_s_by_edge_mean
+u118 = half_sqrt3*m_e_s_by_edge_sin
+m_e_s_by_edge_2 = m_e_s_by_edge_other + u118
+m_e_s_by_edge_3 = m_e_s_by_edge_other - u118
+m_e1s = m_e_s_fixed_1 + e1*m_e_s_by_edge_1 + f1*m_e_s_by_flap_1
+m_e2s = m_e_s_fixed_2 + e2*m_e_s_by_edge_2 + f2*m_e_s_by_flap_2
+m_e3s = m_e_s_fixed_3 + e3*m_e_s_by_edge_3 + f3*m_e_s_by_flap_3
+m_f_p_fixed_mean = -k73_turned
+m_f_p_by_edge_mean = -l135
+m_f1p = m_f_p_fixed_mean + e1*m_f_p_by_edge_mean
+m_f2p = m_f_p_fixed_mean + e2*m_f_p_by_edge_mean
+m_f3p = m_f_p_fixed_mean + e3*m_f_p_by_edge_mean
+m_e_p_fixed_mean = -k97_turned
+m_e1p = m_e_p_fixed_mean + f1*l135
+m_e2p = m_e_p_fixed_mean + f2*l135
+m_e3p = m_e_p_fixed_mean + f3*l135
+l205 = constants[512]
+own_p1 = m_e1p - l205*m_f1p
+own_p2 = m_e2p - l205*m_f2p
+own_p3 = m_e3p - l205*m_f3p
+own_a1 = m_e1a - l205*m_f1a
+own_a2 = m_e2a - l205*m_f2a
+own_a3 = m_e3a - l205*m_f3a
+own_s1 = m_e1s - l205*m_f1s
+own_s2 = m_e2s - l205*m_f2s
+own_s3 = m_e3s - l205*m_f3s
+own_q1 = q_e1 - l205*q_f1
+own_q2 = q_e2 - l205*q_f2
+own_q3 = q_e3 - l205*q_f3
+l206 = constants[513]
+l207 = constants[514]
+r_p = net_moment_x - torque_shaft - l206*(m_f1p*q_f1 + m_f2p*q_f2 + m_f3p*q_f3) - l207*(own_p1*own_q1 + own_p2*own_q2 + own_p3*own_q3)
+l119 = constants[426]
+s_pp = l119 + rih_xx - l206*((m_f1p*m_f1p) + (m_f2p*m_f2p) + (m_f3p*m_f3p)) - l207*((own_p1*own_p1) + (own_p2*own_p2) + (own_p3*own_p3))
+inv_p = (1.0/s_pp)
+l113 = constants[420]
+n_m = constants[48]
+t_da = constants[76]
+r_a = a*l113 + net_force_x*tha_s_x + net_force_y*tha_y + net_force_z*tha_z + net_moment_x*wha_s_x + net_moment_y*wha_y + net_moment_z*wha_z - ad*t_da - l206*(m_f1a*q_f1 + m_f2a*q_f2 + m_f3a*q_f3) - l207*(own_a1*own_q1 + own_a2*own_q2 + own_a3*own_q3) - n_m*(nac_acc_x*nac_ta_x + nac_acc_y*nac_ta_y + nac_acc_z*nac_ta_z) - nac_moment_y*wa_y - nac_moment_z*wa_z
+s_ap = ang_a_x - l206*(m_f1a*m_f1p + m_f2a*m_f2p + m_f3a*m_f3p) - l207*(own_a1*own_p1 + own_a2*own_p2 + own_a3*own_p3)
+l_ap = inv_p*s_ap
+t_maa = constants[62]
+s_aa = t_maa + ang_a_x*wha_s_x + ang_a_y*wha_y + ang_a_z*wha_z + mom_a_x*tha_s_x + mom_a_y*tha_y + mom_a_z*tha_z + n_iyy*(wa_y*wa_y) + n_izz*(wa_z*wa_z) + n_m*((nac_ta_x*nac_ta_x) + (nac_ta_y*nac_ta_y) + (nac_ta_z*nac_ta_z)) - l206*((m_f1a*m_f1a) + (m_f2a*m_f2a) + (m_f3a*m_f3a)) - l207*((own_a1*own_a1) + (own_a2*own_a2) + (own_a3*own_a3))
+inv_a = (1.0/(s_aa - l_ap*s_ap))
+z_a = r_a - l_ap*r_p
+l114 = constants[421]
+t_ds = constants[77]
+r_s = l114*s + nac_moment_x*t_slope_ss + net_force_x*ths_s_x + net_force_y*ths_y + net_force_z*ths_z + net_moment_x*whs_s_x + net_moment_y*whs_y + net_moment_z*whs_z - l206*(m_f1s*q_f1 + m_f2s*q_f2 + m_f3s*q_f3) - l207*(own_q1*own_s1 + own_q2*own_s2 + own_q3*own_s3) - n_m*(nac_acc_x*ts_x + nac_acc_y*nac_ts_y + nac_acc_z*nac_ts_z) - sd*t_ds
+s_sp = ang_s_x - l206*(m_f1p*m_f1s + m_f2p*m_f2s + m_f3p*m_f3s) - l207*(own_p1*own_s1 + own_p2*own_s2 + own_p3*own_s3)
+l_sp = inv_p*s_sp
+s_sa = ang_s_x*wha_s_x + ang_s_y*wha_y + ang_s_z*wha_z + mom_s_x*tha_s_x + mom_s_y*tha_y + mom_s_z*tha_z + n_m*(nac_ta_x*ts_x + nac_ta_y*nac_ts_y + nac_ta_z*nac_ts_z) - l206*(m_f1a*m_f1s + m_f2a*m_f2s + m_f3a*m_f3s) - l207*(own_a1*own_s1 + own_a2*own_s2 + own_a3*own_s3)
+v_sa = s_sa - l_sp*s_ap
+l_sa = inv_a*v_sa
+t_mss = constants[63]
+s_ss = t_mss + ang_s_x*whs_s_x + ang_s_y*whs_y + ang_s_z*whs_z + mom_s_x*ths_s_x + mom_s_y*ths_y + mom_s_z*ths_z + n_ixx*(t_slope_ss*t_slope_ss) + n_m*((nac_ts_y*nac_ts_y) + (nac_ts_z*nac_ts_z) + (ts_x*ts_x)) - l206*((m_f1s*m_f1s) + (m_f2s*m_f2s) + (m_f3s*m_f3s)) - l207*((own_s1*own_s1) + (own_s2*own_s2) + (own_s3*own_s3))
+inv_s = (1.0/(s_ss - l_sa*v_sa - l_sp*s_sp))
+z_s = r_s - l_sa*z_a - l_sp*r_p
+x_s = inv_s*z_s
+x_a = inv_a*z_a - l_sa*x_s
+x_p = inv_p*r_p - l_ap*x_a - l_sp*x_s
+x_e1 = l207*(own_q1 - own_a1*x_a - own_p1*x_p - own_s1*x_s)
+x_f1 = l206*(q_f1 - m_f1a*x_a - m_f1p*x_p - m_f1s*x_s) - l205*x_e1
+x_e2 = l207*(own_q2 - own_a2*x_a - own_p2*x_p - own_s2*x_s)
+x_f2 = l206*(q_f2 - m_f2a*x_a - m_f2p*x_p - m_f2s*x_s) - l205*x_e2
+x_e3 = l207*(own_q3 - own_a3*x_a - own_p3*x_p - own_s3*x_s)
+x_f3 = l206*(q_f3 - m_f3a*x_a - m_f3p*x_p - m_f3s*x_s) - l205*x_e3
+l208 = constants[515]
+l209 = constants[516]
+l210 = constants[517]
+x_gen = l209*(l208*torque_shaft - torque_gen) + l210*x_p
+add = x_a
+sdd = x_s
+f1dd = x_f1
+f2dd = x_f2
+f3dd = x_f3
+e1dd = x_e1
+e2dd = x_e2
+e3dd = x_e3
+phidd = x_p
+gendd = x_gen
+hub_full_x = acc_f_s_x + add*tha_s_x + sdd*ths_s_x
+hub_full_y = acc_f_y + add*tha_y + sdd*ths_y
+hub_full_z = acc_f_z + add*tha_z + sdd*ths_z
+hub_fullspin_x = phidd + spin_f_s_x + add*wha_s_x + sdd*whs_s_x
+hub_fullspin_y = spin_h_y + add*wha_y + sdd*whs_y
+hub_fullspin_z = spin_h_z + add*wha_z + sdd*whs_z
+cos_cone = constants[39]
+u119 = cos_cone*wf_x
+lw_c1_x = u119 - sin_cone*won_z
+u120 = sin_cone*wf_x
+lw_c1_z = u120 + cos_cone*won_z
+u121 = cos_cone*hub_full_x
+lg_c1_x = u121 - hub_full_z*sin_cone
+u122 = hub_full_x*sin_cone
+lg_c1_z = u122 + cos_cone*hub_full_z
+u123 = cos_cone*hub_fullspin_x
+lsp_c1_x = u123 - hub_fullspin_z*sin_cone
+u124 = hub_fullspin_x*sin_cone
+lsp_c1_z = u124 + cos_cone*hub_fullspin_z
+bs1_x = b_ex_turned*e1 + b_fx_turned*f1
+bs1_y = b_ey_turned*e1 + b_fy_turned*f1
+b_m1 = constants[1]
+u125 = -b_m1
+b_see = constants[23]
+u126 = (0.5)*b_see
+b_sff = constants[21]
+u127 = (0.5)*b_sff
+b_sfe = constants[22]
+bs1_z = (-u125) - b_sfe*u31 - u126*u34 - u127*u22
+u128 = 2.0*u31
+u129 = b_eyey_turned*u34 + b_fyey_turned*u128 + b_fyfy_turned*u22
+b_m2 = constants[2]
+b_rsee = constants[26]
+b_rsfe = constants[25]
+b_rsff = constants[24]
+u130 = b_m2 - b_rsee*u34 - b_rsfe*u128 - b_rsff*u22
+bi1_xx = u129 + u130
+u131 = b_fxey_turned + b_fyex_turned
+bi1_xy = (-b_exey_turned*u34) - b_fxfy_turned*u22 - u131*u31
+bi1_xz = (-b_rex_turned*e1) - b_rfx_turned*f1
+u132 = b_exex_turned*u34 + b_fxex_turned*u128 + b_fxfx_turned*u22
+bi1_yy = u130 + u132
+bi1_yz = (-b_rey_turned*e1) - b_rfy_turned*f1
+bi1_zz = u129 + u132
+u133 = (-b_rsee*u43) - b_rsfe*u25
+u134 = b_eyey_turned*u43 + b_fyey_turned*u25
+u135 = (-b_rsfe*u43) - b_rsff*u25
+u136 = b_fyey_turned*u43 + b_fyfy_turned*u25
+bid1_xx = e1d*(u133 + u134) + f1d*(u135 + u136)
+bid1_xy = e1d*((-b_exey_turned*u43) - f1*u131) + f1d*((-b_fxfy_turned*u25) - e1*u131)
+u137 = b_rex_turned*e1d + b_rfx_turned*f1d
+bid1_xz = -u137
+u138 = b_exex_turned*u43 + b_fxex_turned*u25
+u139 = b_fxex_turned*u43 + b_fxfx_turned*u25
+bid1_yy = e1d*(u133 + u138) + f1d*(u135 + u139)
+u140 = b_rey_turned*e1d
+u141 = b_rfy_turned*f1d
+bid1_yz = (-u140) - u141
+bid1_zz = e1d*(u134 + u138) + f1d*(u136 + u139)
+u142 = 2.0*e1d
+u143 = 2.0*f1d
+blade1_whirl_x = b_ex_turned*u142 + b_fx_turned*u143 + bs1_z*won_y - bs1_y*lw_c1_z
+blade1_whirl_y = b_ey_turned*u142 + b_fy_turned*u143 + bs1_x*lw_c1_z - bs1_z*lw_c1_x
+u144 = (-b_see*e1) - b_sfe*f1
+u145 = (-b_sfe*e1) - b_sff*f1
+blade1_whirl_z = bs1_y*lw_c1_x + u142*u144 + u143*u145 - bs1_x*won_y
+blade1_momentum_x = bi1_xx*lw_c1_x + bi1_xy*won_y + bi1_xz*lw_c1_z - u140 - u141
+blade1_momentum_y = u137 + bi1_xy*lw_c1_x + bi1_yy*won_y + bi1_yz*lw_c1_z
+u146 = b_fyex_turned - b_fxey_turned
+blade1_momentum_z = bi1_xz*lw_c1_x + bi1_yz*won_y + bi1_zz*lw_c1_z + u146*u37 - u146*u38
+b_m = constants[0]
+blade1_force_x = b_m*lg_c1_x + blade1_whirl_z*won_y + bs1_z*hub_fullspin_y - blade1_whirl_y*lw_c1_z - bs1_y*lsp_c1_z
+blade1_force_y = b_m*hub_full_y + blade1_whirl_x*lw_c1_z + bs1_x*lsp_c1_z - blade1_whirl_z*lw_c1_x - bs1_z*lsp_c1_x
+u147 = 2.0*b_sfe
+blade1_force_z = b_m*lg_c1_z + blade1_whirl_y*lw_c1_x + bs1_y*lsp_c1_x - b_see*u49 - b_sff*u28 - blade1_whirl_x*won_y - bs1_x*hub_fullspin_y - u147*u46
+blade1_moment_x = bi1_xx*lsp_c1_x + bi1_xy*hub_fullspin_y + bi1_xz*lsp_c1_z + bid1_xx*lw_c1_x + bid1_xy*won_y + bid1_xz*lw_c1_z + blade1_momentum_z*won_y + bs1_y*lg_c1_z - blade1_momentum_y*lw_c1_z - bs1_z*hub_full_y
+blade1_moment_y = bi1_xy*lsp_c1_x + bi1_yy*hub_fullspin_y + bi1_yz*lsp_c1_z + bid1_xy*lw_c1_x + bid1_yy*won_y + bid1_yz*lw_c1_z + blade1_momentum_x*lw_c1_z + bs1_z*lg_c1_x - blade1_momentum_z*lw_c1_x - bs1_x*lg_c1_z
+blade1_moment_z = bi1_xz*lsp_c1_x + bi1_yz*hub_fullspin_y + bi1_zz*lsp_c1_z + bid1_xz*lw_c1_x + bid1_yz*won_y + bid1_zz*lw_c1_z + blade1_momentum_y*lw_c1_x + bs1_x*hub_full_y - blade1_momentum_x*won_y - bs1_y*lg_c1_x
+u148 = uniform_cos + uniform_mean
+blade1_net_x = pressure*(u71 + u73 + c_thrust_edge*e1d + c_thrust_flap*f1d + c_thrust_w*u148) - blade1_force_x - b_ex_turned*e1dd - b_fx_turned*f1dd
+u149 = c_tangential*relative_x
+blade1_net_y = pressure*((-u149) - u72 - c_tangential_edge*e1d - c_tangential_flap*f1d - c_tangential_w*u148) - blade1_force_y - b_ey_turned*e1dd - b_fy_turned*f1dd
+blade1_net_z = (-blade1_force_z) - e1dd*u144 - f1dd*u145
+u150 = pressure*radius
+blade1_netm_x = b_rey_turned*e1dd + b_rfy_turned*f1dd + u150*(u74 + u76 + c_torque_edge*e1d + c_torque_flap*f1d + c_torque_w*u148) - blade1_moment_x
+u151 = c_bending*relative_x
+blade1_netm_y = pressure*radius*(u151 + u75 + c_bending_edge*e1d + c_bending_flap*f1d + c_bending_w*u148) - blade1_moment_y - b_rex_turned*e1dd - b_rfx_turned*f1dd
+blade1_netm_z = e1dd*f1*u146 - blade1_moment_z - e1*f1dd*u146
+u152 = (0.5)*won_y
+u153 = half_sqrt3*won_z
+lw_2_y = u153 - u152
+u154 = (0.5)*won_z
+u155 = half_sqrt3*won_y
+lw_2_z = (-u154) - u155
+lw_c2_x = u119 - lw_2_z*sin_cone
+lw_c2_z = u120 + cos_cone*lw_2_z
+u156 = (0.5)*hub_full_y
+u157 = half_sqrt3*hub_full_z
+lg_2_y = u157 - u156
+u158 = (0.5)*hub_full_z
+u159 = half_sqrt3*hub_full_y
+lg_2_z = (-u158) - u159
+lg_c2_x = u121 - lg_2_z*sin_cone
+lg_c2_z = u122 + cos_cone*lg_2_z
+u160 = (0.5)*hub_fullspin_y
+u161 = half_sqrt3*hub_fullspin_z
+lsp_2_y = u161 - u160
+u162 = (0.5)*hub_fullspin_z
+u163 = half_sqrt3*hub_fullspin_y
+lsp_2_z = (-u162) - u163
+lsp_c2_x = u123 - lsp_2_z*sin_cone
+lsp_c2_z = u124 + cos_cone*lsp_2_z
+bs2_x = b_ex_turned*e2 + b_fx_turned*f2
+bs2_y = b_ey_turned*e2 + b_fy_turned*f2
+bs2_z = (-u125) - b_sfe*u32 - u126*u35 - u127*u23
+u164 = 2.0*u32
+u165 = b_eyey_turned*u35 + b_fyey_turned*u164 + b_fyfy_turned*u23
+u166 = b_m2 - b_rsee*u35 - b_rsfe*u164 - b_rsff*u23
+bi2_xx = u165 + u166
+bi2_xy = (-b_exey_turned*u35) - b_fxfy_turned*u23 - u131*u32
+bi2_xz = (-b_rex_turned*e2) - b_rfx_turned*f2
+u167 = b_exex_turned*u35 + b_fxex_turned*u164 + b_fxfx_turned*u23
+bi2_yy = u166 + u167
+bi2_yz = (-b_rey_turned*e2) - b_rfy_turned*f2
+bi2_zz = u165 + u167
+u168 = (-b_rsee*u44) - b_rsfe*u26
+u169 = b_eyey_turned*u44 + b_fyey_turned*u26
+u170 = (-b_rsfe*u44) - b_rsff*u26
+u171 = b_fyey_turned*u44 + b_fyfy_turned*u26
+bid2_xx = e2d*(u168 + u169) + f2d*(u170 + u171)
+bid2_xy = e2d*((-b_exey_turned*u44) - f2*u131) + f2d*((-b_fxfy_turned*u26) - e2*u131)
+u172 = b_rex_turned*e2d + b_rfx_turned*f2d
+bid2_xz = -u172
+u173 = b_exex_turned*u44 + b_fxex_turned*u26
+u174 = b_fxex_turned*u44 + b_fxfx_turned*u26
+bid2_yy = e2d*(u168 + u173) + f2d*(u170 + u174)
+u175 = b_rey_turned*e2d
+u176 = b_rfy_turned*f2d
+bid2_yz = (-u175) - u176
+bid2_zz = e2d*(u169 + u173) + f2d*(u171 + u174)
+u177 = 2.0*e2d
+u178 = 2.0*f2d
+blade2_whirl_x = b_ex_turned*u177 + b_fx_turned*u178 + bs2_z*lw_2_y - bs2_y*lw_c2_z
+blade2_whirl_y = b_ey_turned*u177 + b_fy_turned*u178 + bs2_x*lw_c2_z - bs2_z*lw_c2_x
+u179 = (-b_see*e2) - b_sfe*f2
+u180 = (-b_sfe*e2) - b_sff*f2
+blade2_whirl_z = bs2_y*lw_c2_x + u177*u179 + u178*u180 - bs2_x*lw_2_y
+blade2_momentum_x = bi2_xx*lw_c2_x + bi2_xy*lw_2_y + bi2_xz*lw_c2_z - u175 - u176
+blade2_momentum_y = u172 + bi2_xy*lw_c2_x + bi2_yy*lw_2_y + bi2_yz*lw_c2_z
+blade2_momentum_z = bi2_xz*lw_c2_x + bi2_yz*lw_2_y + bi2_zz*lw_c2_z + u146*u39 - u146*u40
+blade2_force_x = b_m*lg_c2_x + blade2_whirl_z*lw_2_y + bs2_z*lsp_2_y - blade2_whirl_y*lw_c2_z - bs2_y*lsp_c2_z
+blade2_force_y = b_m*lg_2_y + blade2_whirl_x*lw_c2_z + bs2_x*lsp_c2_z - blade2_whirl_z*lw_c2_x - bs2_z*lsp_c2_x
+blade2_force_z = b_m*lg_c2_z + blade2_whirl_y*lw_c2_x + bs2_y*lsp_c2_x - b_see*u50 - b_sff*u29 - blade2_whirl_x*lw_2_y - bs2_x*lsp_2_y - u147*u47
+blade2_moment_x = bi2_xx*lsp_c2_x + bi2_xy*lsp_2_y + bi2_xz*lsp_c2_z + bid2_xx*lw_c2_x + bid2_xy*lw_2_y + bid2_xz*lw_c2_z + blade2_momentum_z*lw_2_y + bs2_y*lg_c2_z - blade2_momentum_y*lw_c2_z - bs2_z*lg_2_y
+blade2_moment_y = bi2_xy*lsp_c2_x + bi2_yy*lsp_2_y + bi2_yz*lsp_c2_z + bid2_xy*lw_c2_x + bid2_yy*lw_2_y + bid2_yz*lw_c2_z + blade2_momentum_x*lw_c2_z + bs2_z*lg_c2_x - blade2_momentum_z*lw_c2_x - bs2_x*lg_c2_z
+blade2_moment_z = bi2_xz*lsp_c2_x + bi2_yz*lsp_2_y + bi2_zz*lsp_c2_z + bid2_xz*lw_c2_x + bid2_yz*lw_2_y + bid2_zz*lw_c2_z + blade2_momentum_y*lw_c2_x + bs2_x*lg_2_y - blade2_momentum_x*lw_2_y - bs2_y*lg_c2_x
+u181 = (0.5)*kappa_cos
+u182 = half_sqrt3*kappa_sin
+u183 = u182 - u181
+u184 = (0.5)*skew_cos
+u185 = half_sqrt3*skew_sin
+u186 = u185 - u184
+u187 = (0.5)*uniform_cos
+u188 = half_sqrt3*uniform_sin
+u189 = u188 + uniform_mean - u187
+u190 = (0.5)*relative_y
+u191 = half_sqrt3*relative_z
+u192 = u191 - u190
+blade2_net_x = pressure*(u71 + c_thrust_edge*e2d + c_thrust_flap*f2d + c_thrust_kappa*u183 + c_thrust_skew*u186 + c_thrust_w*u189 + c_thrust_y*u192) - blade2_force_x - b_ex_turned*e2dd - b_fx_turned*f2dd
+blade2_net_y = pressure*((-u149) - c_tangential_edge*e2d - c_tangential_flap*f2d - c_tangential_kappa*u183 - c_tangential_skew*u186 - c_tangential_w*u189 - c_tangential_y*u192) - blade2_force_y - b_ey_turned*e2dd - b_fy_turned*f2dd
+blade2_net_z = (-blade2_force_z) - e2dd*u179 - f2dd*u180
+blade2_netm_x = b_rey_turned*e2dd + b_rfy_turned*f2dd + u150*(u74 + c_torque_edge*e2d + c_torque_flap*f2d + c_torque_kappa*u183 + c_torque_skew*u186 + c_torque_w*u189 + c_torque_y*u192) - blade2_moment_x
+blade2_netm_y = pressure*radius*(u151 + c_bending_edge*e2d + c_bending_flap*f2d + c_bending_kappa*u183 + c_bending_skew*u186 + c_bending_w*u189 + c_bending_y*u192) - blade2_moment_y - b_rex_turned*e2dd - b_rfx_turned*f2dd
+blade2_netm_z = e2dd*f2*u146 - blade2_moment_z - e2*f2dd*u146
+lw_3_y = (-u152) - u153
+lw_3_z = u155 - u154
+lw_c3_x = u119 - lw_3_z*sin_cone
+lw_c3_z = u120 + cos_cone*lw_3_z
+lg_3_y = (-u156) - u157
+lg_3_z = u159 - u158
+lg_c3_x = u121 - lg_3_z*sin_cone
+lg_c3_z = u122 + cos_cone*lg_3_z
+lsp_3_y = (-u160) - u161
+lsp_3_z = u163 - u162
+lsp_c3_x = u123 - lsp_3_z*sin_cone
+lsp_c3_z = u124 + cos_cone*lsp_3_z
+bs3_x = b_ex_turned*e3 + b_fx_turned*f3
+bs3_y = b_ey_turned*e3 + b_fy_turned*f3
+bs3_z = (-u125) - b_sfe*u33 - u126*u36 - u127*u24
+u193 = 2.0*u33
+u194 = b_eyey_turned*u36 + b_fyey_turned*u193 + b_fyfy_turned*u24
+u195 = b_m2 - b_rsee*u36 - b_rsfe*u193 - b_rsff*u24
+bi3_xx = u194 + u195
+bi3_xy = (-b_exey_turned*u36) - b_fxfy_turned*u24 - u131*u33
+bi3_xz = (-b_rex_turned*e3) - b_rfx_turned*f3
+u196 = b_exex_turned*u36 + b_fxex_turned*u193 + b_fxfx_turned*u24
+bi3_yy = u195 + u196
+bi3_yz = (-b_rey_turned*e3) - b_rfy_turned*f3
+bi3_zz = u194 + u196
+u197 = (-b_rsee*u45) - b_rsfe*u27
+u198 = b_eyey_turned*u45 + b_fyey_turned*u27
+u199 = (-b_rsfe*u45) - b_rsff*u27
+u200 = b_fyey_turned*u45 + b_fyfy_turned*u27
+bid3_xx = e3d*(u197 + u198) + f3d*(u199 + u200)
+bid3_xy = e3d*((-b_exey_turned*u45) - f3*u131) + f3d*((-b_fxfy_turned*u27) - e3*u131)
+u201 = b_rex_turned*e3d + b_rfx_turned*f3d
+bid3_xz = -u201
+u202 = b_exex_turned*u45 + b_fxex_turned*u27
+u203 = b_fxex_turned*u45 + b_fxfx_turned*u27
+bid3_yy = e3d*(u197 + u202) + f3d*(u199 + u203)
+u204 = b_rey_turned*e3d
+u205 = b_rfy_turned*f3d
+bid3_yz = (-u204) - u205
+bid3_zz = e3d*(u198 + u202) + f3d*(u200 + u203)
+u206 = 2.0*e3d
+u207 = 2.0*f3d
+blade3_whirl_x = b_ex_turned*u206 + b_fx_turned*u207 + bs3_z*lw_3_y - bs3_y*lw_c3_z
+blade3_whirl_y = b_ey_turned*u206 + b_fy_turned*u207 + bs3_x*lw_c3_z - bs3_z*lw_c3_x
+u208 = (-b_see*e3) - b_sfe*f3
+u209 = (-b_sfe*e3) - b_sff*f3
+blade3_whirl_z = bs3_y*lw_c3_x + u206*u208 + u207*u209 - bs3_x*lw_3_y
+blade3_momentum_x = bi3_xx*lw_c3_x + bi3_xy*lw_3_y + bi3_xz*lw_c3_z - u204 - u205
+blade3_momentum_y = u201 + bi3_xy*lw_c3_x + bi3_yy*lw_3_y + bi3_yz*lw_c3_z
+blade3_momentum_z = bi3_xz*lw_c3_x + bi3_yz*lw_3_y + bi3_zz*lw_c3_z + u146*u41 - u146*u42
+blade3_force_x = b_m*lg_c3_x + blade3_whirl_z*lw_3_y + bs3_z*lsp_3_y - blade3_whirl_y*lw_c3_z - bs3_y*lsp_c3_z
+blade3_force_y = b_m*lg_3_y + blade3_whirl_x*lw_c3_z + bs3_x*lsp_c3_z - blade3_whirl_z*lw_c3_x - bs3_z*lsp_c3_x
+blade3_force_z = b_m*lg_c3_z + blade3_whirl_y*lw_c3_x + bs3_y*lsp_c3_x - b_see*u51 - b_sff*u30 - blade3_whirl_x*lw_3_y - bs3_x*lsp_3_y - u147*u48
+blade3_moment_x = bi3_xx*lsp_c3_x + bi3_xy*lsp_3_y + bi3_xz*lsp_c3_z + bid3_xx*lw_c3_x + bid3_xy*lw_3_y + bid3_xz*lw_c3_z + blade3_momentum_z*lw_3_y + bs3_y*lg_c3_z - blade3_momentum_y*lw_c3_z - bs3_z*lg_3_y
+blade3_moment_y = bi3_xy*lsp_c3_x + bi3_yy*lsp_3_y + bi3_yz*lsp_c3_z + bid3_xy*lw_c3_x + bid3_yy*lw_3_y + bid3_yz*lw_c3_z + blade3_momentum_x*lw_c3_z + bs3_z*lg_c3_x - blade3_momentum_z*lw_c3_x - bs3_x*lg_c3_z
+blade3_moment_z = bi3_xz*lsp_c3_x + bi3_yz*lsp_3_y + bi3_zz*lsp_c3_z + bid3_xz*lw_c3_x + bid3_yz*lw_3_y + bid3_zz*lw_c3_z + blade3_momentum_y*lw_c3_x + bs3_x*lg_3_y - blade3_momentum_x*lw_3_y - bs3_y*lg_c3_x
+u210 = (-u181) - u182
+u211 = (-u184) - u185
+u212 = uniform_mean - u187 - u188
+u213 = (-u190) - u191
+blade3_net_x = pressure*(u71 + c_thrust_edge*e3d + c_thrust_flap*f3d + c_thrust_kappa*u210 + c_thrust_skew*u211 + c_thrust_w*u212 + c_thrust_y*u213) - blade3_force_x - b_ex_turned*e3dd - b_fx_turned*f3dd
+blade3_net_y = pressure*((-u149) - c_tangential_edge*e3d - c_tangential_flap*f3d - c_tangential_kappa*u210 - c_tangential_skew*u211 - c_tangential_w*u212 - c_tangential_y*u213) - blade3_force_y - b_ey_turned*e3dd - b_fy_turned*f3dd
+blade3_net_z = (-blade3_force_z) - e3dd*u208 - f3dd*u209
+blade3_netm_x = b_rey_turned*e3dd + b_rfy_turned*f3dd + u150*(u74 + c_torque_edge*e3d + c_torque_flap*f3d + c_torque_kappa*u210 + c_torque_skew*u211 + c_torque_w*u212 + c_torque_y*u213) - blade3_moment_x
+blade3_netm_y = pressure*radius*(u151 + c_bending_edge*e3d + c_bending_flap*f3d + c_bending_kappa*u210 + c_bending_skew*u211 + c_bending_w*u212 + c_bending_y*u213) - blade3_moment_y - b_rex_turned*e3dd - b_rfx_turned*f3dd
+blade3_netm_z = e3dd*f3*u146 - blade3_moment_z - e3*f3dd*u146
+h_m = constants[43]
+rotor_force_x = blade1_net_x*cos_cone + blade1_net_z*sin_cone + blade2_net_x*cos_cone + blade2_net_z*sin_cone + blade3_net_x*cos_cone + blade3_net_z*sin_cone - h_m*hub_full_x
+rotor_force_y = blade1_net_y + half_sqrt3*(blade3_net_z*cos_cone - blade3_net_x*sin_cone) - (0.5)*blade2_net_y - (0.5)*blade3_net_y - h_m*hub_full_y - half_sqrt3*(blade2_net_z*cos_cone - blade2_net_x*sin_cone)
+rotor_force_z = blade1_net_z*cos_cone + (0.5)*blade2_net_x*sin_cone + blade2_net_y*half_sqrt3 + (0.5)*blade3_net_x*sin_cone - blade1_net_x*sin_cone - (0.5)*blade2_net_z*cos_cone - blade3_net_y*half_sqrt3 - (0.5)*blade3_net_z*cos_cone - h_m*hub_full_z
+rotor_moment_x = blade1_netm_x*cos_cone + blade1_netm_z*sin_cone + blade2_netm_x*cos_cone + blade2_netm_z*sin_cone + blade3_netm_x*cos_cone + blade3_netm_z*sin_cone - h_ixx*hub_fullspin_x
+rotor_moment_y = blade1_netm_y + h_itt*wf_x*won_z + half_sqrt3*(blade3_netm_z*cos_cone - blade3_netm_x*sin_cone) - (0.5)*blade2_netm_y - (0.5)*blade3_netm_y - h_itt*hub_fullspin_y - h_ixx*u80 - half_sqrt3*(blade2_netm_z*cos_cone - blade2_netm_x*sin_cone)
+rotor_moment_z = blade1_netm_z*cos_cone + (0.5)*blade2_netm_x*sin_cone + blade2_netm_y*half_sqrt3 + (0.5)*blade3_netm_x*sin_cone + h_ixx*wf_x*won_y - blade1_netm_x*sin_cone - (0.5)*blade2_netm_z*cos_cone - blade3_netm_y*half_sqrt3 - (0.5)*blade3_netm_z*cos_cone - h_itt*hub_fullspin_z - h_itt*u79
+u214 = cos_phi*rotor_force_z + rotor_force_y*sin_phi
+rf_n_x = cos_tilt*rotor_force_x - sin_tilt*u214
+rf_n_y = cos_phi*rotor_force_y - rotor_force_z*sin_phi
+rf_n_z = cos_tilt*u214 + rotor_force_x*sin_tilt
+u215 = cos_phi*rotor_moment_z + rotor_moment_y*sin_phi
+rm_n_x = cos_tilt*rotor_moment_x - sin_tilt*u215
+rm_n_y = cos_phi*rotor_moment_y - rotor_moment_z*sin_phi
+rm_n_z = cos_tilt*u215 + rotor_moment_x*sin_tilt
+nacl_ta_x = u55
+nacl_ta_y = u56
+nacl_ta_z = u57
+nacl_ts_y = u58
+nacl_ts_z = u59
+nacl_acc_x = u62
+nacl_acc_y = u64
+nacl_acc_z = u65
+nacl_full_x = nacl_acc_x + add*nacl_ta_x + sdd*ts_x
+nacl_full_y = nacl_acc_y + add*nacl_ta_y + nacl_ts_y*sdd
+nacl_full_z = nacl_acc_z + add*nacl_ta_z + nacl_ts_z*sdd
+nacl_fullspin_x = -sdd*t_slope_ss
+nacl_fullspin_y = spin_n_y + add*wa_y
+nacl_fullspin_z = spin_n_z + add*wa_z
+nac_force_x = -n_m*nacl_full_x
+nac_force_y = -n_m*nacl_full_y
+nac_force_z = -n_m*nacl_full_z
+top_force_x = nac_force_x + rf_n_x
+top_force_y = nac_force_y + rf_n_y
+top_force_z = nac_force_z + rf_n_z
+g_i = constants[55]
+u216 = g_i*gendd
+top_moment_x = rm_n_x + u66 + n_y*nac_force_z - u67 - cos_tilt*u216 - l1*rf_n_y - n_ixx*nacl_fullspin_x - n_z*nac_force_y
+top_moment_y = rm_n_y + l1*rf_n_x + n_z*nac_force_x - u69 - l0*rf_n_z - n_iyy*nacl_fullspin_y - n_x*nac_force_z
+top_moment_z = rm_n_z + l0*rf_n_y + n_x*nac_force_y - u70 - n_izz*nacl_fullspin_z - n_y*nac_force_x - sin_tilt*u216
+u217 = roll_cos*top_force_z + roll_sin*top_force_y
+base_force_x = pitch_cos*top_force_x + pitch_sin*u217
+base_force_y = roll_cos*top_force_y - roll_sin*top_force_z
+base_force_z = pitch_cos*u217 - pitch_sin*top_force_x
 t_fa = constants[64]
 t_h = constants[61]
 t_zfa = constants[66]
@@ -2166,10 +3286,8 @@ out[4] = theta_c*(blade3_netm_y - b_root*blade3_net_x) + theta_s*(blade3_netm_x 
 out[5] = theta_c*(blade1_netm_x + b_root*blade1_net_y) - theta_s*(blade1_netm_y - b_root*blade1_net_x)
 out[6] = theta_c*(blade2_netm_x + b_root*blade2_net_y) - theta_s*(blade2_netm_y - b_root*blade2_net_x)
 out[7] = theta_c*(blade3_netm_x + b_root*blade3_net_y) - theta_s*(blade3_netm_y - b_root*blade3_net_x)
-l6 = constants[313]
-out[8] = torque_shaft + l6*phidd
-l7 = constants[314]
-out[9] = l7*pressure*(c_thrust*relative_x + c_thrust_edge*g_mean + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
+out[8] = torque_shaft + l119*phidd
+out[9] = l115*pressure*(c_thrust*relative_x + c_thrust_edge*g_mean + c_thrust_flap*d_mean + c_thrust_w*uniform_mean)
 out[10] = torque_gen
 out[11] = b_tip_ex_turned*e1 + b_tip_fx_turned*f1
 out[12] = b_tip_ex_turned*e2 + b_tip_fx_turned*f2
@@ -2180,10 +3298,10 @@ out[16] = b_tip_ey_turned*e3 + b_tip_fy_turned*f3
 out[17] = add
 out[18] = sdd
 """)
-_loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'derivative', 'out'), LANES)
+_loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'out'), LANES)
 
 
 @njit(**INLINE)
-def loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped):
-    """Load channels of LANES states: x, derivative (20, LANES), wind (5, LANES), control (1, LANES), out (k, LANES)."""
-    _loads(x, wind, control, derivative, out, start, tables, cells, constants, clamped)
+def loads(x, wind, control, out, start, tables, cells, constants, clamped):
+    """Load channels of LANES states: x (20, LANES), wind (5, LANES), control (1, LANES), out (k, LANES)."""
+    _loads(x, wind, control, out, start, tables, cells, constants, clamped)
