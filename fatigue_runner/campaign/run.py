@@ -123,7 +123,9 @@ def _run_campaign(
         folder = out if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh, [column.name for column in plan.columns])
         with nullcontext() if dask is None else Cluster(dask) as cluster:
-            simulated = _simulate(plan, store, workers or plan.campaign.workers, cluster, progress, watch, block)
+            simulated = _simulate(
+                plan, store, workers or plan.campaign.workers, cluster, progress, watch, block
+            )
         settled = not simulated and store.settled
         with stage("table"):
             results = _collect(plan, store, simulated, settled)

@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from fatigue_runner.benchmark.speed import machine
 from fatigue_runner.benchmark.study import adaptive
@@ -240,7 +241,11 @@ def identity(sets: Sequence[Cases], settings: Settings) -> str:
         digest.update(json.dumps([cases.name, *values], sort_keys=True).encode())
         for integrator in integrators:
             if integrator.corrector is not None:
-                digest.update(pickle.dumps(integrator.corrector))
+                # not the object as a whole: it keeps what it has made of its map
+                corrector: Any = integrator.corrector
+                digest.update(repr((corrector.name, corrector.recipe, dict(corrector.training))).encode())
+                for name, values in sorted(corrector.map.tensors().items()):
+                    digest.update(name.encode() + np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()[:16]
 
 
