@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from fatigue_runner import on_demand
 from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning
 from fatigue_runner.interruption import exit_code_of
 from fatigue_runner.terminal import console, write_plainly
@@ -31,7 +32,7 @@ MOUNTED = {
     "report": "fatigue_runner.report.commands",
     "compare": "fatigue_runner.report.compare_command",
     "view": "fatigue_runner.viewer.commands",
-    "logs": "fatigue_runner.logbook.commands",
+    "logs": "fatigue_runner.logs_command",
     "turbine": "fatigue_runner.integrators.commands",
     "train": "fatigue_runner.corrector.train_command",
     "correctors": "fatigue_runner.corrector.commands",
@@ -72,6 +73,16 @@ def _print_version(wanted: bool) -> None:
 
         typer.echo(f"fatigue-runner {__version__}")
         raise typer.Exit
+
+
+def _make_log(path: Path) -> bool:
+    """A log of a run that keeps few of them, for whoever opens it."""
+    from fatigue_runner.campaign import log_on_demand
+
+    return log_on_demand(path, lambda what: typer.echo(f"{what} ...", err=True))
+
+
+on_demand.maker = _make_log
 
 
 @app.callback()

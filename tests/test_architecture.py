@@ -31,6 +31,7 @@ FLOOR = {
     "_version",
     "interruption",
     "stopwatch",
+    "on_demand",
 }
 
 # Which rooms a room may import. A new room is one line here.
@@ -76,6 +77,7 @@ MAY_IMPORT = {
     "__init__": {"api"},
     "__main__": {"cli"},
     "version_command": {"campaign"},
+    "logs_command": {"campaign", "logbook"},
 }
 
 # A library that only some rooms may load.
@@ -90,6 +92,7 @@ ONLY_IN = {
     "joblib": {"campaign", "corrector", "benchmark"},
     "typer": {
         "version_command",
+        "logs_command",
         "cli",
         "terminal",
         "logbook",

@@ -4,6 +4,7 @@ Blocks of cases go to the lane kernel on a pool of workers; every finished case 
 row of the results table. A run folder can be resumed.
 """
 
+from fatigue_runner.campaign.demand import log_on_demand, make_logs
 from fatigue_runner.campaign.run import CampaignInterrupted, run_campaign
 
-__all__ = ["CampaignInterrupted", "run_campaign"]
+__all__ = ["CampaignInterrupted", "log_on_demand", "make_logs", "run_campaign"]

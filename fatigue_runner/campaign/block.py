@@ -54,8 +54,8 @@ class Setup:
 class Job:
     """One block: the cases to run, the references of their winds, the winds' states (size,) at t = 0 by id.
 
-    logged: {case id: record} of the cases whose trajectory stands in a log already, so that it is read, not
-    simulated.
+    logged: ids of the cases whose trajectory stands in a log already, so that it is read, not simulated; to_log: of those whose log is
+    written; leaves: whether each record is left in the run folder as soon as the case is done.
     """
 
     setup: Setup
@@ -63,6 +63,8 @@ class Job:
     references: list[Case]
     initial: dict[str, np.ndarray]
     logged: set[str]
+    to_log: set[str]
+    leaves: bool = True
 
 
 def run_block(job: Job) -> list[dict[str, Any]]:
@@ -84,6 +86,7 @@ def run_block(job: Job) -> list[dict[str, Any]]:
             record = _one(job, case, winds[case.wind], outcome, references, case.id in wanted)
             if record is not None:
                 records.append(record)
+            if record is not None and job.leaves:
                 # a full disk, a folder that is gone: the record comes back with the block's
                 with suppress(OSError):
                     leave(job.setup.logs.parent, job.cases[0].id, record)
@@ -245,7 +248,7 @@ def _finish(
 
     campaign = job.setup.campaign
     row = make_row(case, wind, trajectory, own, reference, campaign)
-    if not campaign.log.enabled:
+    if case.id not in job.to_log:
         return _record(case, row)
     path = job.setup.logs / f"{case.id}.mcap"
     identity = {

@@ -39,7 +39,7 @@ def make_cases(resolved: Resolved) -> list[Case]:
     campaign = resolved.campaign
     common = campaign.model_dump(include={"duration", "output_rate", "initial", "pitch"})
     evaluation = campaign.model_dump(include={"fatigue", "discard", "loads"}) | {
-        "log": campaign.log.model_dump()
+        "log": campaign.log.model_dump(exclude={"enabled", "cases"})
     }
     evaluation["walls"] = {
         place: [wall.circle.diameter, wall.circle.wall] for place, wall in resolved.walls.items()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fatigue_runner import channels
 from fatigue_runner.campaign.about import wind_words
 from fatigue_runner.campaign.integration import Integration
+from fatigue_runner.campaign.kept_logs import KeptLogs
 from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.campaign.spec import Pitch
 from fatigue_runner.errors import InputError
@@ -23,6 +24,7 @@ def check(resolved: Resolved) -> list[str]:
     that make no bins of a life.
     """
     _check_logged_channels(resolved)
+    _check_kept_logs(resolved)
     _check_lifetime(resolved)
     for integration in resolved.integrations:
         try:
@@ -83,6 +85,16 @@ def _check_logged_channels(resolved: Resolved) -> None:
         where = resolved.source.where(("log", "topics", (log.topics or []).index("control")))
         raise InputError(
             f"{where}: with operation {turbine.operation!r} there is no controller to log; remove 'control'"
+        )
+
+
+def _check_kept_logs(resolved: Resolved) -> None:
+    """What is chosen by errors needs what they are measured against."""
+    kept = resolved.campaign.log.cases
+    if isinstance(kept, KeptLogs) and kept.worst is not None and resolved.campaign.reference is None:
+        raise InputError(
+            f"{resolved.source.where(('log', 'cases', 'worst'))}: without a reference nobody knows which cases are the worst; use `sample` "
+            "or give a reference"
         )
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fatigue_runner.campaign.about import turbine_yaml
 from fatigue_runner.campaign.block import Job, Setup
 from fatigue_runner.campaign.bounds import winds_in_memory
 from fatigue_runner.campaign.cases import Case, blocks, make_cases
 from fatigue_runner.campaign.check import check
+from fatigue_runner.campaign.kept_logs import ALL, NONE, WORST, Kept, KeptLogs, at_once, chosen
 from fatigue_runner.campaign.provenance import code_hash
 from fatigue_runner.campaign.resolve import Resolved, ResolvedWind, resolve
 from fatigue_runner.campaign.spec import Campaign, read_campaign
@@ -67,8 +69,6 @@ class Plan:
     def log_bytes(self) -> float:
         """About what the log of one case takes [bytes]: a number and its tag, the messages' heads, less what compression takes off."""
         campaign = self.campaign
-        if not campaign.log.enabled:
-            return 0.0
         layout = self.resolved.turbine.layout
         signals = max(len(wind.source.channels) for wind in self.resolved.winds)
         topics = {
@@ -89,15 +89,56 @@ class Plan:
             * (1.0 if campaign.log.compression == "none" else COMPRESSED)
         )
 
+    @cached_property
+    def kept_logs(self) -> Kept:
+        """Whose logs stay."""
+        return chosen(self.campaign.log.cases, len(self.cases)) if self.campaign.log.enabled else NONE
+
+    @cached_property
+    def logged_at_once(self) -> set[str]:
+        """Ids of the cases whose logs are written as they run."""
+        return at_once(self.kept_logs, [case.id for case in self.cases])
+
+    @property
+    def chooses_afterwards(self) -> bool:
+        """Whether more logs are written when all cases have run."""
+        return isinstance(self.kept_logs, KeptLogs) and self.kept_logs.sample is None
+
+    def setup(self, out: Path, facts: dict[str, str], text: str) -> Setup:
+        """What all blocks share; facts: what the run knows of itself, for the logs; text: the resolved campaign."""
+        turbine = self.resolved.turbine
+        return Setup(
+            self.campaign,
+            self.resolved.turbine_source,
+            turbine.hash,
+            turbine.layout.states,
+            out.resolve() / "logs",
+            facts,
+            {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(self.resolved).encode()},
+            self.resolved.walls,
+            self.resolved.sections,
+        )
+
+    def finished(self, store: Store, case: Case) -> bool:
+        """Whether a case need not run again."""
+        return store.finished(case, case.id in self.logged_at_once)
+
     def jobs(self, store: Store, setup: Setup, workers: int) -> list[Job]:
         """The blocks of all cases that are not finished in the store, with the references that they need."""
+        pending = [case for case in self.cases if not self.finished(store, case)]
+        return self._blocks(pending, store, setup, workers)
+
+    def jobs_for_logs(self, ids: Collection[str], store: Store, setup: Setup, workers: int) -> list[Job]:
+        """The blocks of these cases, which are finished, for their logs."""
+        cases = [case for case in self.cases if case.id in ids]
+        made = self._blocks(cases, store, setup, workers)
+        return [replace(job, to_log={case.id for case in job.cases}, leaves=False) for job in made]
+
+    def _blocks(self, cases: Sequence[Case], store: Store, setup: Setup, workers: int) -> list[Job]:
         pending: dict[str, list[Case]] = {}
-        references: dict[str, Case] = {}
-        for case in self.cases:
-            if case.integration.is_reference:
-                references[case.wind.id] = case
-            if not store.finished(case, self.campaign.log.enabled):
-                pending.setdefault(case.wind.id, []).append(case)
+        for case in cases:
+            pending.setdefault(case.wind.id, []).append(case)
+        references = {case.wind.id: case for case in self.cases if case.integration.is_reference}
         layout, sources = self.resolved.turbine.layout, [self.winds[wind].source for wind in pending]
         keys = [(source.cell_key, layout.wind_size(source.channels)) for source in sources]
         jobs = []
@@ -106,10 +147,11 @@ class Plan:
         size = min(size, winds_in_memory(self.campaign.duration * self.campaign.output_rate))
         for winds in blocks(list(pending), keys, size, workers):
             needed = [references[wind] for wind in winds if wind in references]
-            cases = [case for wind in winds for case in pending[wind]]
-            logged = {case.id for case in [*needed, *cases] if self.logs_are_whole and store.logged(case)}
+            own = [case for wind in winds for case in pending[wind]]
+            logged = {case.id for case in [*needed, *own] if self.logs_are_whole and store.logged(case)}
             initial = {wind: self.winds[wind].initial for wind in winds}
-            jobs.append(Job(setup, cases, needed, initial, logged))
+            to_log = {case.id for case in own} & self.logged_at_once
+            jobs.append(Job(setup, own, needed, initial, logged, to_log))
         return jobs
 
 
@@ -125,4 +167,10 @@ def make_plan(
     say("loading the kernels (the first run compiles them)")
     resolved = resolve(spec, source)
     notes = check(resolved)
-    return Plan(resolved, make_cases(resolved), notes)
+    plan = Plan(resolved, make_cases(resolved), notes)
+    if spec.log.enabled and spec.log.cases is None and plan.kept_logs != ALL:
+        plan.notes.append(
+            f"{len(plan.cases):,} cases: logs of the {WORST} worst are kept (`log: {{cases: all}}` keeps every one; "
+            "`fatigue-runner logs make` writes any other later)"
+        )
+    return plan

@@ -17,12 +17,13 @@ from fatigue_runner.campaign.about import (
     operating_curve,
     resolved_yaml,
     timed_evaluations,
-    turbine_yaml,
     wind_words,
 )
 from fatigue_runner.campaign.block import Job, Setup, run_block, warm_up
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.cluster import Cluster
+from fatigue_runner.campaign.demand import write_logs
+from fatigue_runner.campaign.kept_logs import afterwards
 from fatigue_runner.campaign.parcel import pack
 from fatigue_runner.campaign.pieces import followed
 from fatigue_runner.campaign.plan import Plan, make_plan
@@ -181,17 +182,7 @@ def _simulate(
     with stage("check of the reference"):
         facts = about(plan.resolved) | beside(lambda: reference_facts(plan, store.earlier))
     text = resolved_yaml(plan.resolved)
-    setup = Setup(
-        plan.campaign,
-        plan.resolved.turbine_source,
-        plan.resolved.turbine.hash,
-        plan.resolved.turbine.layout.states,
-        store.out.resolve() / "logs",
-        facts,
-        {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(plan.resolved).encode()},
-        plan.resolved.walls,
-        plan.resolved.sections,
-    )
+    setup = plan.setup(store.out, facts, text)
     about_run = {
         "cases": len(plan.cases),
         "facts": facts,
@@ -222,6 +213,8 @@ def _simulate(
                     progress.note(f"{error}; what it was doing is tried once more")
                     progress.advance(store.take_in())
                     _run_again(error, block, plan.jobs(store, setup, workers), workers, store, progress)
+            # after the last look at what workers left, which would put the records without a log behind those with one
+            _write_more_logs(plan, store, setup, run, workers, cluster, progress)
         return pending
     except KeyboardInterrupt as interrupt:
         dismiss_workers()
@@ -240,6 +233,19 @@ def _simulate(
         ) from None
     finally:
         store.close()
+
+
+def _write_more_logs(
+    plan: Plan, store: Store, setup: Setup, run: Callable[[Job], Any], workers: int, cluster: Cluster | None, progress: Any
+) -> None:  # fmt: skip
+    """The logs of those cases that turned out to be worth one."""
+    if not plan.chooses_afterwards:
+        return
+    found = set(afterwards(plan.kept_logs, store.rows(plan.cases)))
+    missing = [case.id for case in plan.cases if case.id in found and not store.finished(case, logged=True)]
+    if missing:
+        jobs = plan.jobs_for_logs(missing, store, setup, workers)
+        write_logs(store, jobs, run, workers, None if cluster is None else cluster.address, progress.say)
 
 
 def _run(
@@ -273,7 +279,7 @@ def _sample(jobs: Sequence[Job]) -> Job:
             key = method.method, method.corrector, method.mode, wind.kind, bool(wind.tower), any(wind.angles)
             kinds.setdefault(key, (case, job.initial[wind.id]))
     initial = {case.wind.id: state for case, state in kinds.values()}
-    return Job(jobs[0].setup, [case for case, _ in kinds.values()], [], initial, set())
+    return Job(jobs[0].setup, [case for case, _ in kinds.values()], [], initial, set(), set())
 
 
 @contextmanager
@@ -296,12 +302,13 @@ def _before(plan: Plan, store: Store, pending: int) -> list[str]:
     """What a person should know of the disk before the cases run: how much the logs will take, and logs that nobody wants any more."""
     said = []
     free = shutil.disk_usage(store.out).free
-    size = pending * plan.log_bytes
+    logs = min(pending, len(plan.logged_at_once))
+    size = logs * plan.log_bytes
     if size > LARGE or size > 0.5 * free:
         little = ", too little" if size > free else ""
         said.append(
-            f"the logs of {pending} cases will take about {size / 1e9:.2g} GB; {free / 1e9:.3g} GB are free{little} (`log:` in the "
-            "campaign can leave out topics and channels)"
+            f"the logs of {logs} cases will take about {size / 1e9:.2g} GB; {free / 1e9:.3g} GB are free{little} (`log: {{cases: none}}` "
+            "keeps none, and any can be made later)"
         )
     if store.damaged:
         said.append(
@@ -318,7 +325,7 @@ def _before(plan: Plan, store: Store, pending: int) -> list[str]:
 
 
 def _finished(plan: Plan, store: Store) -> str:
-    done = sum(store.finished(case, plan.campaign.log.enabled) for case in plan.cases)
+    done = sum(plan.finished(store, case) for case in plan.cases)
     return f"{done} of {len(plan.cases)} cases"
 
 

@@ -33,6 +33,9 @@ delta_t          whether one evaluation of f and of each corrector is timed, and
 lifetime         the life that the cases stand for, from the site's wind: {climate, years, ...}, see `results/lifetime_section.py`
 
 log.enabled      one MCAP file per case in logs/ (default true)
+log.cases        whose: `all` (default up to 400 cases), `none`, {worst: N} (default beyond), {sample: N}, {where: [diverged, rejected]};
+                any other log can be made later (`fatigue-runner logs make`)
+log.precision    `float32` (default) or `float64`
 log.compression  `zstd` (default), `lz4` or `none`
 log.topics       which of `state`, `loads`, `status`, `wind`, `control` (default all; less cannot be read back)
 log.channels     names of states, wind signals, loads and signals of the controller (default all)
@@ -61,6 +64,7 @@ from pydantic import (
 
 from fatigue_runner import shipped
 from fatigue_runner.campaign.damage_section import DamageSection
+from fatigue_runner.campaign.kept_logs import Kept
 from fatigue_runner.campaign.loads_section import LoadsSection
 from fatigue_runner.channels import (
     BY_NAME,
@@ -200,6 +204,7 @@ class Log(Section):
     """One MCAP file per case."""
 
     enabled: bool = True
+    cases: Kept | None = None
     compression: Literal["zstd", "lz4", "none"] = "zstd"
     precision: Literal["float32", "float64"] = "float32"
     topics: Annotated[list[Topic], BeforeValidator(check_not_empty)] | None = None

@@ -94,6 +94,15 @@ class Store:
         """The rows of finished cases, in their order, from cases.jsonl."""
         return Rows(self._columns, self._rows_of(cases))
 
+    def record(self, case_id: str) -> dict[str, Any] | None:
+        """The whole record of a case, from cases.jsonl; None where there is none."""
+        kept = self._kept.get(case_id)
+        if kept is None:
+            return None
+        with self._journal_path.open("rb") as journal:
+            journal.seek(kept.place)
+            return from_line(journal.read(kept.size).rstrip(b"\n"))
+
     def _rows_of(self, cases: Iterable[Case]) -> Iterator[dict[str, Any]]:
         with self._journal_path.open("rb") as journal:
             for case in cases:

@@ -17,6 +17,7 @@ from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.export import export as export_log
 from fatigue_runner.logbook.recovery import recover as recover_log
 from fatigue_runner.logbook.summary import TOLD, Extreme, LogSummary, summarise, what_ran
+from fatigue_runner.on_demand import present
 from fatigue_runner.terminal import command_group
 
 app = command_group("Look into the logs of a run: what ran, whether the file is whole, repair it, export it.")
@@ -45,7 +46,7 @@ def info(
     console = Console()
     # A cut number would be a wrong one: rather let a narrow terminal wrap the lines.
     console.width = max(console.width, _WIDTH)
-    summary = summarise(log)
+    summary = summarise(present(log))
     _print_head(console, summary, everything)
     _print_acceptance(console, summary)
     if summary.reference_error:
@@ -280,5 +281,5 @@ def export(
 
         fatigue-runner logs export case.mcap -o flap.csv -c 'blade*_root_flapwise_moment' -c wind_speed
     """
-    names = export_log(log, channels, out)
+    names = export_log(present(log), channels, out)
     typer.echo(f"{out}: {', '.join(names)}")

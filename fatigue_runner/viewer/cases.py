@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
@@ -15,7 +15,9 @@ from fatigue_runner.inputs.source import parse_mapping
 from fatigue_runner.layout import FAMILIES, family_of
 from fatigue_runner.logbook import Log, LogError, read_log, read_metadata
 from fatigue_runner.naming import integrator_label
+from fatigue_runner.on_demand import present
 from fatigue_runner.results.columns import WIND
+from fatigue_runner.results.records import whole_records
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.viewer import colours
 from fatigue_runner.viewer.scene import Geometry, geometry
@@ -54,7 +56,7 @@ def find_logs(paths: Sequence[Path], case: str | None = None) -> list[Path]:
     for path in paths:
         if path.is_dir():
             found += _of_folder(path, case)
-        elif path.exists():
+        elif present(path).exists():
             found.append(path)
         else:
             raise InputError(f"{path} does not exist; give a log (.mcap) or the folder that `run` wrote")
@@ -64,6 +66,17 @@ def find_logs(paths: Sequence[Path], case: str | None = None) -> list[Path]:
 def _of_folder(folder: Path, case: str | None) -> list[Path]:
     place = folder / "logs" if (folder / "logs").is_dir() else folder
     logs = {path.name.removesuffix(".mcap"): path for path in sorted(place.glob("*.mcap"))}
+    rows = _recorded(folder)
+    if case is None and not logs and rows:
+        case = next(iter(rows))
+    if case is not None and case not in logs and case in rows:
+        # the run kept no log of it: it is made again, and that of its reference
+        beside = [
+            name
+            for name, row in rows.items()
+            if row["is_reference"] and _wind_of(row) == _wind_of(rows[case])
+        ]
+        logs |= {name: present(place / f"{name}.mcap") for name in dict.fromkeys([case, *beside])}
     if not logs:
         raise InputError(
             f"there is no log (.mcap) in {place}; `run` writes them unless `log: enabled: false`"
@@ -78,6 +91,17 @@ def _of_folder(folder: Path, case: str | None) -> list[Path]:
     return [logs[name] for name in [chosen, *same]]
 
 
+def _recorded(folder: Path) -> dict[str, Mapping[str, Any]]:
+    """Rows of the cases of a run folder by their ids; empty for another folder."""
+    try:
+        found = whole_records((folder / "cases.jsonl").read_bytes())[0]
+    except OSError:
+        return {}
+    return {
+        record["row"]["case_id"]: record["row"] for record in found if record["row"]["status"] != "failed"
+    }
+
+
 def _run_of(path: Path) -> dict[str, str]:
     try:
         return read_metadata(path).get("run", {})
@@ -85,7 +109,7 @@ def _run_of(path: Path) -> dict[str, str]:
         return {}  # shown to the user when it is this log that is to be read
 
 
-def _wind_of(run: dict[str, str]) -> tuple[str | None, ...]:
+def _wind_of(run: Mapping[str, Any]) -> tuple[Any, ...]:
     return tuple(run.get(key) for key in _WIND_KEYS)
 
 
