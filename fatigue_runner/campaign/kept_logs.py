@@ -12,7 +12,7 @@ from fatigue_runner.inputs.section import TAG, Section, problem
 from fatigue_runner.inputs.sweep import check_not_empty
 
 MANY = 400  # cases whose logs are all kept where a campaign does not say
-WORST = 20  # of more cases than that
+FEW = 20  # of more cases than that
 
 Where = Literal["diverged", "rejected"]
 
@@ -38,11 +38,11 @@ Kept = Annotated[
 ]
 
 
-def chosen(kept: Kept | None, cases: int) -> Kept:
-    """What holds for a campaign of so many cases that says `kept`, or nothing."""
+def chosen(kept: Kept | None, cases: int, watched: bool = False) -> Kept:
+    """What holds for a campaign of so many cases that says `kept`, or nothing; watched: whether somebody wants to see them run."""
     if kept is not None:
         return kept
-    return ALL if cases <= MANY else KeptLogs(worst=WORST)
+    return ALL if cases <= MANY else KeptLogs(sample=FEW) if watched else KeptLogs(worst=FEW)
 
 
 def at_once(kept: Kept, cases: Sequence[str]) -> set[str]:

@@ -13,7 +13,7 @@ from fatigue_runner.campaign.block import Job, Setup
 from fatigue_runner.campaign.bounds import winds_in_memory
 from fatigue_runner.campaign.cases import Case, blocks, make_cases
 from fatigue_runner.campaign.check import check
-from fatigue_runner.campaign.kept_logs import ALL, NONE, WORST, Kept, KeptLogs, at_once, chosen
+from fatigue_runner.campaign.kept_logs import ALL, FEW, NONE, Kept, KeptLogs, at_once, chosen
 from fatigue_runner.campaign.provenance import code_hash
 from fatigue_runner.campaign.resolve import Resolved, ResolvedWind, resolve
 from fatigue_runner.campaign.spec import Campaign, read_campaign
@@ -36,6 +36,7 @@ class Plan:
     resolved: Resolved
     cases: list[Case]
     notes: list[str] = field(default_factory=list)
+    watched: bool = False  # somebody wants to see cases while they run
 
     @property
     def campaign(self) -> Campaign:
@@ -92,7 +93,26 @@ class Plan:
     @cached_property
     def kept_logs(self) -> Kept:
         """Whose logs stay."""
-        return chosen(self.campaign.log.cases, len(self.cases)) if self.campaign.log.enabled else NONE
+        if not self.campaign.log.enabled:
+            return NONE
+        return chosen(self.campaign.log.cases, len(self.cases), self.watched)
+
+    @property
+    def words_of_logs(self) -> list[str]:
+        """What a person should know of the logs before the run, where it is not what the file says."""
+        which, at_once = self.kept_logs, self.logged_at_once
+        said = []
+        if self.campaign.log.enabled and self.campaign.log.cases is None and which != ALL:
+            some = "every so many" if at_once else "the worst"
+            said.append(
+                f"{len(self.cases):,} cases: logs of {FEW} of them are kept, of {some} (`log: {{cases: all}}` keeps every one; "
+                "`fatigue-runner logs make` writes any other later)"
+            )
+        if self.watched and not at_once:
+            said.append(
+                "no case of this campaign is logged while it runs, so there is nothing to watch: `log: {cases: {sample: 20}}` logs some"
+            )
+        return said
 
     @cached_property
     def logged_at_once(self) -> set[str]:
@@ -167,10 +187,4 @@ def make_plan(
     say("loading the kernels (the first run compiles them)")
     resolved = resolve(spec, source)
     notes = check(resolved)
-    plan = Plan(resolved, make_cases(resolved), notes)
-    if spec.log.enabled and spec.log.cases is None and plan.kept_logs != ALL:
-        plan.notes.append(
-            f"{len(plan.cases):,} cases: logs of the {WORST} worst are kept (`log: {{cases: all}}` keeps every one; "
-            "`fatigue-runner logs make` writes any other later)"
-        )
-    return plan
+    return Plan(resolved, make_cases(resolved), notes)

@@ -119,7 +119,8 @@ def _run_campaign(
     with Progress(console) as progress:
         with stage("planning"):
             plan = make_plan(campaign, progress.say)
-        for sentence in plan.notes:
+        plan.watched = watch is not None
+        for sentence in [*plan.notes, *plan.words_of_logs]:
             progress.note(sentence)
         folder = out if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh, [column.name for column in plan.columns])

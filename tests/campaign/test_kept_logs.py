@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from campaign_world import CAMPAIGN, build_world, write_campaign
+from campaign_world import build_world, write_campaign
 from typer.testing import CliRunner
 
 from fatigue_runner import on_demand
@@ -161,9 +161,20 @@ def test_beyond_some_hundred_cases_the_default_is_told(monkeypatch, tmp_path):
     assert world.calls == []
     assert (chosen(None, MANY), chosen(None, MANY + 1)) == ("all", KeptLogs(worst=20))
     monkeypatch.setattr("fatigue_runner.campaign.kept_logs.MANY", 3)
-    assert any("logs of the 20 worst are kept" in note for note in make_plan(write_campaign(tmp_path)).notes)
-    said = make_plan(write_campaign(tmp_path, CAMPAIGN + "log: {cases: all}\n"))
-    assert not any("worst" in note for note in said.notes)
+    (sentence,) = make_plan(write_campaign(tmp_path)).words_of_logs
+    assert "12 cases: logs of 20 of them are kept, of the worst" in sentence
+    assert make_plan(write_campaign(tmp_path, log="{cases: all}")).words_of_logs == []
+
+
+def test_who_watches_a_large_campaign_sees_some_cases_of_it(monkeypatch, tmp_path):
+    build_world(monkeypatch)
+    monkeypatch.setattr("fatigue_runner.campaign.kept_logs.MANY", 3)
+    plan = make_plan(write_campaign(tmp_path))
+    plan.watched = True
+    assert len(plan.logged_at_once) == 12 and "of every so many" in plan.words_of_logs[0]
+    blind = make_plan(write_campaign(tmp_path, log="{cases: {worst: 3}}"))
+    blind.watched = True
+    assert "nothing to watch" in blind.words_of_logs[0]
 
 
 @pytest.mark.parametrize(
