@@ -265,4 +265,4 @@ def make_and_count(campaign: Path, out: Path) -> int:
 
     plan = make_plan(campaign)
     store = Store(out, plan.identity)
-    return sum(store.finished(case, True) for case in plan.cases)
+    return sum(plan.finished(store, case) for case in plan.cases)
