@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fatigue_runner.campaign.cases import Case
+from fatigue_runner.campaign.cases import Case, log_precision
 from fatigue_runner.campaign.evaluate import (
     Evaluated,
     evaluate,
@@ -279,7 +279,7 @@ def _finish(
             result,
             reference_error=error,
             compression=campaign.log.compression,
-            precision=campaign.log.precision,
+            precision=log_precision(case, campaign),
             topics=campaign.log.topics,
             channels=campaign.logged,
         )

@@ -8,7 +8,7 @@ import json
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.provenance import code_hash
@@ -16,6 +16,9 @@ from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.errors import InputError
 from fatigue_runner.naming import LONGEST_NAME, joined
 from fatigue_runner.wind.section import Realisation
+
+if TYPE_CHECKING:
+    from fatigue_runner.campaign.spec import Campaign
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,11 @@ class Case:
     integration: Integration
     simulation_hash: str
     hash: str
+
+
+def log_precision(case: Case, campaign: Campaign) -> str:
+    """Of its log: a reference's reads back to the bit, since others are measured against it when a run goes on."""
+    return "float64" if case.integration.is_reference else campaign.log.precision
 
 
 def make_cases(resolved: Resolved) -> list[Case]:

@@ -11,7 +11,7 @@ from typing import Any
 from fatigue_runner.campaign.about import turbine_yaml
 from fatigue_runner.campaign.block import Job, Setup
 from fatigue_runner.campaign.bounds import winds_in_memory
-from fatigue_runner.campaign.cases import Case, blocks, make_cases
+from fatigue_runner.campaign.cases import Case, blocks, log_precision, make_cases
 from fatigue_runner.campaign.check import check
 from fatigue_runner.campaign.kept_logs import ALL, FEW, NONE, Kept, KeptLogs, at_once, chosen
 from fatigue_runner.campaign.provenance import code_hash
@@ -60,11 +60,10 @@ class Plan:
         fatigue, states = self.campaign.fatigue, self.resolved.turbine.layout.states
         return table(self.campaign.counted, fatigue.wohler_exponents, states, fatigue.angles)
 
-    @property
-    def logs_are_whole(self) -> bool:
-        """Whether a log holds all that a trajectory needs to be evaluated again, to the bit."""
+    def log_is_whole(self, case: Case) -> bool:
+        """Whether a case's log holds all that its trajectory needs to be evaluated again, to the bit."""
         log = self.campaign.log
-        return log.topics is None and log.channels is None and log.precision == "float64"
+        return log.topics is None and log.channels is None and log_precision(case, self.campaign) == "float64"
 
     @property
     def log_bytes(self) -> float:
@@ -168,7 +167,7 @@ class Plan:
         for winds in blocks(list(pending), keys, size, workers):
             needed = [references[wind] for wind in winds if wind in references]
             own = [case for wind in winds for case in pending[wind]]
-            logged = {case.id for case in [*needed, *own] if self.logs_are_whole and store.logged(case)}
+            logged = {case.id for case in [*needed, *own] if self.log_is_whole(case) and store.logged(case)}
             initial = {wind: self.winds[wind].initial for wind in winds}
             to_log = {case.id for case in own} & self.logged_at_once
             jobs.append(Job(setup, own, needed, initial, logged, to_log))
