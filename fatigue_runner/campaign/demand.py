@@ -14,7 +14,7 @@ from fatigue_runner.campaign.pool import run_jobs
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.errors import FatigueRunnerError, InputError, did_you_mean
 from fatigue_runner.interruption import end_if_asked
-from fatigue_runner.results.records import whole_records
+from fatigue_runner.results.records import head_of, lines_of
 
 _OF_THE_RUN = ("wall_time",)  # columns that are of the moment when a case ran
 
@@ -119,8 +119,9 @@ def log_on_demand(path: Path, say: Callable[[str], None] = lambda what: None) ->
     folder, name = path.parent.parent, path.name.removesuffix(".mcap")
     if path.parent.name != "logs" or path.suffix != ".mcap" or not (folder / "cases.jsonl").is_file():
         return False
-    records = whole_records((folder / "cases.jsonl").read_bytes())[0]
-    if not any(record["row"]["case_id"] == name for record in records):
-        return False
+    with (folder / "cases.jsonl").open("rb") as journal:
+        heads = (head_of(line) for _, line in lines_of(journal))
+        if not any(head is not None and head.case_id == name for head in heads):
+            return False
     make_logs(folder, [name], 1, say)
     return True

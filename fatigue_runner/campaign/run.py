@@ -215,7 +215,8 @@ def _simulate(
                     progress.advance(store.take_in())
                     _run_again(error, block, plan.jobs(store, setup, workers), workers, store, progress)
             # after the last look at what workers left, which would put the records without a log behind those with one
-            _write_more_logs(plan, store, setup, run, workers, cluster, progress)
+            if plan.chooses_afterwards and (pending or not store.settled):
+                _write_more_logs(plan, store, setup, run, workers, cluster, progress)
         return pending
     except KeyboardInterrupt as interrupt:
         dismiss_workers()
@@ -240,8 +241,6 @@ def _write_more_logs(
     plan: Plan, store: Store, setup: Setup, run: Callable[[Job], Any], workers: int, cluster: Cluster | None, progress: Any
 ) -> None:  # fmt: skip
     """The logs of those cases that turned out to be worth one."""
-    if not plan.chooses_afterwards:
-        return
     found = set(afterwards(plan.kept_logs, store.rows(plan.cases)))
     missing = [case.id for case in plan.cases if case.id in found and not store.finished(case, logged=True)]
     if missing:

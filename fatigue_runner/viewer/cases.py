@@ -66,7 +66,8 @@ def find_logs(paths: Sequence[Path], case: str | None = None) -> list[Path]:
 def _of_folder(folder: Path, case: str | None) -> list[Path]:
     place = folder / "logs" if (folder / "logs").is_dir() else folder
     logs = {path.name.removesuffix(".mcap"): path for path in sorted(place.glob("*.mcap"))}
-    rows = _recorded(folder)
+    # thousands of records are not read where the logs themselves tell what there is
+    rows = _recorded(folder) if not logs or (case is not None and case not in logs) else {}
     if case is None and not logs and rows:
         case = next(iter(rows))
     if case is not None and case not in logs and case in rows:

@@ -124,6 +124,17 @@ def test_who_opens_a_log_that_is_not_there_gets_it(finished, monkeypatch):
     assert isinstance(both.exception, InputError)
 
 
+def test_a_run_with_nothing_to_do_does_not_look_for_the_worst_again(finished, monkeypatch):
+    spec = SPEC | {"log": {"cases": {"worst": 1}}, "integrators": [{"method": "rk4", "step": 0.1}]}
+    monkeypatch.setattr(
+        "fatigue_runner.campaign.run.afterwards", lambda *_: pytest.fail("nothing has changed")
+    )
+    assert run_campaign(spec, finished).simulated == 0
+    monkeypatch.undo()
+    more = run_campaign(spec | {"log": {"cases": {"worst": 2}}}, finished)
+    assert more.simulated == 0 and len(logs(finished)) == 2
+
+
 def row(case_id, status="done", accepted=None, **figures):
     return {"case_id": case_id, "status": status, "acceptance_rate": accepted, "nrmse_max": None, **figures}
 
