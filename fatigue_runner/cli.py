@@ -19,7 +19,7 @@ from typer.core import TyperGroup
 
 from fatigue_runner import on_demand
 from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning
-from fatigue_runner.interruption import exit_code_of
+from fatigue_runner.interruption import Interrupted, exit_code_of
 from fatigue_runner.terminal import console, write_plainly
 
 if TYPE_CHECKING:
@@ -54,6 +54,19 @@ class _LazyGroup(TyperGroup):
         command = typer.main.get_command(import_module(MOUNTED[cmd_name]).app)
         command.name = cmd_name
         return command
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; ended from outside, whatever it is, it says so in one sentence."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt as interrupt:
+            if "joblib" in sys.modules:
+                from fatigue_runner.campaign.pool import dismiss_workers
+
+                dismiss_workers()
+            raise Interrupted(
+                "interrupted; the same command does the rest", exit_code_of(interrupt)
+            ) from None
 
 
 app = typer.Typer(
@@ -161,7 +174,7 @@ def run(
 
         fatigue-runner run my.yaml --live --pace 1
     """
-    from fatigue_runner.campaign import CampaignInterrupted, run_campaign
+    from fatigue_runner.campaign import run_campaign
 
     to = console()
     with ExitStack() as until_the_end:
@@ -172,14 +185,9 @@ def run(
             watch = until_the_end.enter_context(
                 watcher(pace=pace, case=live_case, port=viewer_port, share=live_share, say=_plainly(to))
             )
-        try:
-            results = run_campaign(
-                campaign, out, workers=workers, fresh=fresh, dask=dask, console=to, watch=watch
-            )
-        except KeyboardInterrupt as interrupt:
-            raise CampaignInterrupted(
-                "interrupted; the same command goes on", exit_code_of(interrupt)
-            ) from None
+        results = run_campaign(
+            campaign, out, workers=workers, fresh=fresh, dask=dask, console=to, watch=watch
+        )
     _print_outcome(results, to)
     raise typer.Exit(results.exit_code)
 

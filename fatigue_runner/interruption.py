@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+from fatigue_runner.errors import FatigueRunnerError
+
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 _lost: list[
@@ -24,6 +26,14 @@ class Ended(KeyboardInterrupt):
     def __init__(self, number: int) -> None:
         super().__init__()
         self.exit_code = 128 + number
+
+
+class Interrupted(FatigueRunnerError):
+    """What a command says when it was ended from outside; `exit_code` is 130, 143 or 129."""
+
+    def __init__(self, message: str, exit_code: int = 130) -> None:
+        super().__init__(message)
+        self.exit_code = exit_code
 
 
 def exit_code_of(error: KeyboardInterrupt) -> int:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import os
+import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from campaign_world import CAMPAIGN, build_world, write_campaign
 import fatigue_runner
 from fatigue_runner import cli
 from fatigue_runner.errors import InputError
+from fatigue_runner.interruption import Ended
 
 
 @pytest.fixture
@@ -142,6 +145,38 @@ def test_an_interruption_before_anything_ran_ends_with_130_too(call, tmp_path, m
 
     monkeypatch.setattr("fatigue_runner.campaign.run.make_plan", interrupt)
     assert call("run", write_campaign(tmp_path))[0] == 130
+
+
+@pytest.mark.parametrize("command", sorted(cli.MOUNTED))
+def test_every_command_that_is_ended_says_so_in_one_sentence(call, monkeypatch, command):
+    def ended(self, ctx):
+        raise Ended(signal.SIGTERM)
+
+    monkeypatch.setattr(cli.TyperGroup, "invoke", ended)
+    assert call(command) == (143, "", "error: interrupted; the same command does the rest\n")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_real_signal_ends_logs_make_with_a_sentence_and_its_code(number):
+    """The work itself is stood in for by a wait: what ends it is the command line's."""
+    program = (
+        "import sys, time, types\n"
+        "def make_logs(*_):\n    print('at work', flush=True)\n    time.sleep(100)\n"
+        "sys.modules['fatigue_runner.campaign'] = types.SimpleNamespace(make_logs=make_logs)\n"
+        "sys.argv = ['fatigue-runner', 'logs', 'make', 'runs/x', '--all']\n"
+        "from fatigue_runner.__main__ import main\n"
+        "main()\n"
+    )
+    # a test run in the background may ignore SIGINT, which its children would inherit
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),
+    )  # fmt: skip
+    assert process.stdout is not None and process.stdout.readline() == "at work\n"
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (128 + number, "error: interrupted; the same command does the rest\n")
 
 
 def test_a_bug_is_told_as_one_without_a_traceback(call, tmp_path, monkeypatch):

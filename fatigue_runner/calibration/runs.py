@@ -18,7 +18,6 @@ from fatigue_runner.results.cells import Row, integrator, number, text, truth
 from fatigue_runner.results.table import read_results
 
 Array = NDArray[np.float64]
-EXPONENTS = (3.0, 4.0, 5.0, 10.0, 12.0)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from fatigue_runner.campaign.pool import WorkerEndedError, beside, dismiss_worke
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.campaign.trust import reference_facts
 from fatigue_runner.errors import FatigueRunnerError
-from fatigue_runner.interruption import end_if_asked, exit_code_of
+from fatigue_runner.interruption import Interrupted, end_if_asked, exit_code_of
 from fatigue_runner.results.beyond import beyond
 from fatigue_runner.results.table import Results, read_rows
 from fatigue_runner.stopwatch import stage
@@ -50,12 +50,8 @@ Block = Callable[[Job], list[dict[str, Any]]]
 LARGE = 1e9  # bytes of logs that are told before a run
 
 
-class CampaignInterrupted(FatigueRunnerError):
-    """Ctrl-C, SIGTERM or SIGHUP: what is finished is kept. `exit_code` is 130, 143 or 129."""
-
-    def __init__(self, message: str, exit_code: int = 130) -> None:
-        super().__init__(message)
-        self.exit_code = exit_code
+class CampaignInterrupted(Interrupted):
+    """Ctrl-C, SIGTERM or SIGHUP: what is finished is kept."""
 
 
 def run_campaign(

@@ -10,7 +10,7 @@ the names of channels.
 from fatigue_runner.logbook.check import Check, check
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.export import export
-from fatigue_runner.logbook.metadata import checksum, is_complete, read_metadata
+from fatigue_runner.logbook.metadata import checksum, read_metadata
 from fatigue_runner.logbook.reader import Log, read_log
 from fatigue_runner.logbook.recovery import Recovery, recover
 from fatigue_runner.logbook.summary import LogSummary, summarise
@@ -28,7 +28,6 @@ __all__ = [
     "check",
     "checksum",
     "export",
-    "is_complete",
     "log_of",
     "read_log",
     "read_metadata",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import zlib
 from contextlib import suppress
-from pathlib import Path
 from typing import IO, Any
 
 from mcap.opcode import Opcode
@@ -114,19 +113,3 @@ def checksum(path: str | os.PathLike[str]) -> int:
         while data := stream.read(1 << 20):
             crc = zlib.crc32(data, crc)
     return crc
-
-
-def is_complete(path: str | os.PathLike[str]) -> bool:
-    """Whether the file is a whole log with its result and all of its rows; False even for no file.
-
-    Reads the end of the file only: a flipped bit inside a chunk is found by `recovery.check` or when it is
-    read.
-    """
-    if not Path(path).is_file():
-        return False
-    try:
-        index, metadata = read_summary(path)
-    except (Damage, LogError):
-        return False
-    rows = max(index.statistics.channel_message_counts.values(), default=0)
-    return metadata.get("result", {}).get("rows") == str(rows)

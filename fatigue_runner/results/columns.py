@@ -178,7 +178,6 @@ def of_group(*groups: Group) -> tuple[str, ...]:
 
 
 WIND = of_group("wind")  # what tells two winds apart
-INTEGRATOR = of_group("integrator")
 DESCRIPTION = of_group("wind", "operation", "integrator")  # what was simulated; a log says it, too
 NEEDED = ("case_id", "method", "step", "is_reference", "status")  # without them no table is a campaign's
 _KINDS = {column.name: column.kind for column in CASE}

@@ -48,8 +48,6 @@ def table_names(skewed_wake: bool) -> tuple[str, ...]:
     return tuple(name + suffix for name in LOAD_NAMES for suffix in suffixes)
 
 
-TABLE_NAMES = table_names(True)
-
 TIP_SPEED_RATIO = np.linspace(0.5, 15.0, 117)
 PITCH_DEG = np.concatenate([np.arange(-5.0, 10.0, 0.5), np.arange(10.0, 30.5, 1.0)])
 

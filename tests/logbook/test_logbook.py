@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 
 from fatigue_runner import channels
 from fatigue_runner.fatigue import damage_equivalent_load
-from fatigue_runner.logbook import LogError, LogWriter, is_complete, read_log, read_metadata, write_log
+from fatigue_runner.logbook import LogError, LogWriter, check, read_log, read_metadata, write_log
 from fatigue_runner.logbook.records import walk
 
 
@@ -127,16 +127,14 @@ def test_metadata_are_read_without_touching_the_chunks(log_path, tmp_path):
 
 
 def test_a_log_is_complete_only_with_its_end_its_result_and_all_of_its_rows(log_path, tmp_path):
-    assert is_complete(log_path)
-    assert not is_complete(tmp_path / "absent.mcap")
-    assert not is_complete(tmp_path)
+    assert check(log_path).complete
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(log_path.read_bytes()[:-1])
-    assert not is_complete(cut)
+    assert not check(cut).complete
     with LogWriter(tmp_path / "short.mcap") as log:
         log.append(example(5))
         log.rows = 6  # as if a row had been lost on its way into the file
-    assert not is_complete(tmp_path / "short.mcap")
+    assert not check(tmp_path / "short.mcap").complete
 
 
 def test_names_that_are_missing_or_no_log_are_refused_in_one_sentence(tmp_path):

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from fatigue_runner.channels import LOAD_NAMES
 from fatigue_runner.errors import FatigueRunnerError
-from fatigue_runner.logbook import LogError, check, export, is_complete, summarise, write_log
+from fatigue_runner.logbook import LogError, check, export, summarise, write_log
 from fatigue_runner.logbook.commands import app
 
 
@@ -164,7 +164,8 @@ def test_recover_repairs_a_part_file_and_says_what_was_lost(tmp_path):
     part.write_bytes(whole.read_bytes()[: whole.stat().st_size * 3 // 4])
     code, text = logs("recover", part)
     assert code == 0 and f"repaired: {tmp_path / 'case.mcap'}" in text and "lost: every row after" in text
-    assert check(tmp_path / "case.mcap").ok and not is_complete(tmp_path / "case.mcap")
+    found = check(tmp_path / "case.mcap")
+    assert found.ok and not found.complete
     code, text = logs("recover", whole)
     assert code == 0 and "nothing to repair" in text
 

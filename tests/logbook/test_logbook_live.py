@@ -19,7 +19,6 @@ from fatigue_runner.logbook import (
     LogTail,
     LogWriter,
     check,
-    is_complete,
     read_log,
     read_metadata,
     recover,
@@ -66,7 +65,7 @@ def test_the_final_name_appears_only_when_the_log_is_whole(tmp_path):
     with LogWriter(path) as log:
         log.append(example())
         assert not path.exists() and log.part.exists()
-    assert is_complete(path) and not log.part.exists()
+    assert check(path).complete and not log.part.exists()
 
 
 def test_a_chunk_is_closed_after_a_second_of_wall_time(tmp_path, monkeypatch):
@@ -174,7 +173,7 @@ def test_two_writers_of_one_log_are_refused(tmp_path):
         log.append(example())
         with pytest.raises(LogError, match="being written by another process"):
             LogWriter(tmp_path / "a.mcap")
-    assert is_complete(tmp_path / "a.mcap")
+    assert check(tmp_path / "a.mcap").complete
 
 
 # --- disks and folders that do not take it
