@@ -41,10 +41,18 @@ def save(corrector: Corrector, path: Path) -> None:
 
     from fatigue_runner.inputs.files import write_atomically
 
-    tensors = {name: np.ascontiguousarray(array) for name, array in corrector.map.tensors().items()}
-    write_atomically(
-        path, to_bytes(tensors, metadata={"format": FORMAT, "header": json.dumps(_header(corrector))})
-    )
+    header = _header(corrector)
+    tensors = {**corrector.map.tensors()}
+    if corrector.rungs:
+        header["rungs"] = [_header(rung) for rung in corrector.rungs]
+        for number, rung in enumerate(corrector.rungs, start=1):
+            tensors |= {_of_rung(number, name): weights for name, weights in rung.map.tensors().items()}
+    tensors = {name: np.ascontiguousarray(array) for name, array in tensors.items()}
+    write_atomically(path, to_bytes(tensors, metadata={"format": FORMAT, "header": json.dumps(header)}))
+
+
+def _of_rung(number: int, name: str) -> str:
+    return f"rung{number}.{name}"
 
 
 def _header(corrector: Corrector) -> dict[str, Any]:
@@ -115,14 +123,22 @@ def load(path: Path | str) -> Corrector:
         raise CorrectorError(f"{path}: the header cannot be read ({error}); train it anew") from None
     try:
         check_header(header)
-        return _corrector(header, tensors)
+        rungs = []
+        for number, below in enumerate(header.get("rungs", ()), start=1):
+            check_header(below)
+            first = _of_rung(number, "")
+            own = {k.removeprefix(first): v for k, v in tensors.items() if k.startswith(first)}
+            rungs.append(_corrector(below, own))
+        return _corrector(header, tensors, tuple(rungs))
     except CorrectorError as error:
         raise CorrectorError(f"{path}: {error}; copy or train it anew") from None
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise CorrectorError(f"{path}: header and arrays do not fit ({error}); train it anew") from None
 
 
-def _corrector(header: dict[str, Any], tensors: dict[str, Any]) -> Corrector:
+def _corrector(
+    header: dict[str, Any], tensors: dict[str, Any], rungs: tuple[Corrector, ...] = ()
+) -> Corrector:
     if header["kind"] not in MAPS:
         from fatigue_runner.corrector import families  # noqa: F401 - a family may bring a map of its own
     guard: dict[str, Any] = {k: _tuples(v) for k, v in header["guard"].items()}
@@ -138,4 +154,5 @@ def _corrector(header: dict[str, Any], tensors: dict[str, Any]) -> Corrector:
         kind.read(header, tensors, _layout(header)),
         Guard(**guard, ahead_atol=tuple(header.get("ahead_atol", ()))),
         **{**facts, "wind_range": tuple(facts["wind_range"])},
+        rungs=rungs,
     )

@@ -25,6 +25,8 @@ def summary(corrector: Corrector) -> list[tuple[str, str]]:
     if corrector.fallback is not None:
         own = "steps" if corrector.past else "substeps"
         fallback = f"{guard.substeps} {own} of {corrector.fallback[0]}"
+    for rung in reversed(corrector.rungs):
+        fallback = f"corrected steps of {rung.step * 1e3:g} ms, then {fallback}"
     sizes = [" x ".join(map(str, weights.shape)) for weights in corrector.map.tensors().values()]
     return [
         ("family", corrector.family),

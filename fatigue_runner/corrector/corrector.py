@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fatigue_runner.corrector.binding import Binding
+from fatigue_runner.corrector.binding import SAME_STEP, Binding
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.maps import Map
 from fatigue_runner.corrector.maps.map import Run
+from fatigue_runner.integrators.step_ladder import ENDS, reaches
 from fatigue_runner.integrators.tableaux import RK4
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ class Corrector:
     """N(x, p) of x+ = eta_h(x) + h^(p+1) N, for one turbine, method and step [s]: a `integrators.protocol.StepCorrector`.
 
     Of its making: wind_range [m/s] of the training, figures on winds that were not trained on (`validation`), facts of the training,
-    the text of the recipe. Raises CorrectorError where binding, map and guard do not fit together.
+    the text of the recipe. rungs: correctors at a half, a quarter, ... of the step that make what this one's guard refuses, see
+    `integrators.step_ladder`. Raises CorrectorError where binding, map, guard and rungs do not fit together.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Corrector:
     training: Mapping[str, Any] = field(default_factory=dict)
     recipe: str = ""
     licence: str = "Apache-2.0"
+    rungs: tuple[Corrector, ...] = ()
 
     def __post_init__(self) -> None:
         method = self.binding.found
@@ -53,6 +56,21 @@ class Corrector:
             raise CorrectorError(f"corrector {self.name}: {error}") from None
         if not all(np.isfinite(weights).all() for weights in self.map.tensors().values()):
             raise CorrectorError(f"corrector {self.name}: a weight is not a finite number; train it anew")
+        for number, rung in enumerate(self.rungs, start=1):
+            self._check_rung(rung, 2**number)
+
+    def _check_rung(self, rung: Corrector, steps: int) -> None:
+        what, other = f"corrector {self.name}: its rung at {rung.step * 1e3:g} ms", rung.binding
+        if not (self.past and rung.past):
+            raise CorrectorError(f"{what}: only exponential Adams methods have a ladder of steps")
+        if abs(rung.step * steps - self.step) > SAME_STEP * self.step:
+            raise CorrectorError(f"{what} must be at {self.step / steps * 1e3:g} ms")
+        if (other.turbine_hash, other.operation) != (self.turbine_hash, self.binding.operation):
+            raise CorrectorError(f"{what} is for another turbine")
+        if rung.rungs:
+            raise CorrectorError(f"{what} has rungs of its own; list them all here")
+        if reaches(rung.past, steps) > min(self.past, ENDS) - 1:
+            raise CorrectorError(f"{what} looks back further than the steps above it")
 
     def __repr__(self) -> str:
         return f"Corrector({self.name!r}, {self.family}, {self.turbine}, {self.method} at {self.step * 1e3:g} ms)"

@@ -12,6 +12,7 @@ from fatigue_runner.inputs.section import problem, validated
 from fatigue_runner.inputs.source import Source
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", max_length=100)]
+MOST_RUNGS = 4
 Word = Annotated[str, Field(min_length=1, max_length=100)]
 
 
@@ -54,6 +55,7 @@ class _Header(_Checked):
     ahead_atol: list[float] = []
     states: list[Word] | None = None
     wind: list[Word] | None = None
+    rungs: list[dict[str, Any]] = Field(default=[], max_length=MOST_RUNGS)
 
     @model_validator(mode="after")
     def _range_ascends(self) -> _Header:

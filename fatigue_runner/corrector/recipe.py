@@ -56,12 +56,13 @@ class Progress:
 
 @dataclass(frozen=True)
 class Learned:
-    """What a family's training gives: the map, its guard, the winds seen [m/s], and what is to be said of it on the card."""
+    """What a family's training gives: the map, its guard, the winds seen [m/s], what is to be said of it on the card, and its rungs."""
 
     map: Map
     guard: Guard
     wind_range: tuple[float, float]
     facts: Mapping[str, Any] = field(default_factory=dict)
+    rungs: tuple[Corrector, ...] = ()
 
 
 class Recipe(Section):

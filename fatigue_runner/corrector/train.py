@@ -97,7 +97,14 @@ def train(
     learned = recipe.train(turbine, progress)
     binding = Binding.to(turbine, recipe.method, recipe.step)
     corrector = Corrector(
-        recipe.name, recipe.family, binding, learned.map, learned.guard, learned.wind_range, recipe=text
+        recipe.name,
+        recipe.family,
+        binding,
+        learned.map,
+        learned.guard,
+        learned.wind_range,
+        recipe=text,
+        rungs=learned.rungs,
     )
     progress.say("validation")
     figures = validate(corrector, recipe, turbine)

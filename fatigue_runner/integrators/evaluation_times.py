@@ -21,9 +21,10 @@ from fatigue_runner.integrators.contract import Lanes
 from fatigue_runner.integrators.corrected import CorrectedArrays
 from fatigue_runner.integrators.correction import correction
 from fatigue_runner.integrators.ensemble import Ensemble, Integrator
-from fatigue_runner.integrators.exponential_adams import ExponentialAdamsArrays, learned_products
+from fatigue_runner.integrators.exponential_steps import ExponentialAdamsArrays, learned_products
 from fatigue_runner.integrators.pitch import PitchSeries
 from fatigue_runner.integrators.signals import PitchCells, Signals, signals_at
+from fatigue_runner.integrators.step_ladder import LadderArrays
 from fatigue_runner.integrators.stepper import Ring, room
 from fatigue_runner.turbine.lane_code import LANES
 from fatigue_runner.turbine.lanes import aligned, counters, to_groups
@@ -69,6 +70,7 @@ def _of_stages(method: Any, model: Any, h: float, signals: Signals, ring: Ring) 
     )  # fmt: skip
 
 
+@compiled_for(learned, LadderArrays)
 @compiled_for(learned, ExponentialAdamsArrays)
 @njit(**LEAN)
 def _of_earlier_values(method: Any, model: Any, h: float, signals: Signals, ring: Ring) -> None:

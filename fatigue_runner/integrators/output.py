@@ -7,6 +7,7 @@ first-order state has its value and slope only: order 3 through two step ends, 5
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import factorial
@@ -112,3 +113,15 @@ def plan_output(
         x = hermite_weights(round(found, 9), nodes, 2)[0]
         first[i, 6 - len(x) :] = x
     return OutputPlan(time, number, exact, line.astype(np.int64), position, velocity, first)
+
+
+def places_between(places: Sequence[float]) -> PlanArrays:
+    """For values at `places` [steps, up to 0] from the newest of three step ends; one row and one line of weights each."""
+    count = len(places)
+    position, velocity, first = np.zeros((count, 9)), np.zeros((count, 9)), np.zeros((count, 6))
+    nodes = (-1.0, 0.0, 1.0)
+    for i, place in enumerate(places):
+        position[i], velocity[i] = hermite_weights(round(1.0 + place, 9), nodes)
+        first[i] = hermite_weights(round(1.0 + place, 9), nodes, 2)[0]
+    lines = np.arange(count, dtype=np.int64)
+    return PlanArrays(lines, np.zeros(count, np.bool_), lines, position, velocity, first)

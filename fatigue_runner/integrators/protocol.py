@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from fatigue_runner.turbine import Turbine
 
 Array = NDArray[np.float64]
@@ -122,6 +124,12 @@ class StepCorrector(Protocol):
 
     @property
     def guard(self) -> Guard: ...
+    @property
+    def rungs(self) -> Sequence[StepCorrector]:
+        """Correctors at a half, a quarter, ... of the step: what this one's guard refuses is made by the first of them that accepts it,
+        before RK4 makes it; empty for most, and for Runge-Kutta methods."""
+        ...
+
     def bind(self, turbine: Turbine, method: str, step: float) -> None:
         """Raises InputError unless it was made for this turbine, method and step [s]."""
         ...

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 from corrector_example import trained
+from operation_example import SPEEDS, error, runs, shipped, turbine, wind
 from simulating import simulate_block
 
 from fatigue_runner.corrector import CorrectorError, coordinates, features, find, load, save, steps
@@ -16,45 +16,7 @@ from fatigue_runner.errors import InputError
 from fatigue_runner.integrators import method, multi_blade
 from fatigue_runner.integrators.initial import initial_state
 from fatigue_runner.integrators.linear_part import linearisation_point
-from fatigue_runner.turbine import load_turbine
-from fatigue_runner.wind import ConstantWind, TurbulentWind
-
-SPEEDS = (4.0, 8.0, 12.0, 18.0, 24.0)  # m/s
-
-
-@cache
-def turbine(operation="controlled"):
-    return load_turbine("nrel5mw").operated(operation)
-
-
-@cache
-def shipped():
-    return find("etdabm3-100ms-operation")
-
-
-def wind(speed, seed=9_200_000, duration=62.0, harmonics=6):
-    found = TurbulentWind(speed, 0.14, seed=seed, duration=duration, shear_exponent=0.2, harmonics=harmonics)
-    return found.on(turbine().rotor)
-
-
-@cache
-def runs(name, step, mode="", duration=60.0):
-    winds = [wind(v) for v in SPEEDS]
-    start = np.array([initial_state(turbine(), "operating-point", w) for w in winds])
-    corrector = shipped() if mode else None
-    return simulate_block(
-        turbine(), name, step, winds, start, duration, 0.1, corrector=corrector, mode=mode or "enhanced"
-    )
-
-
-def error(found):
-    """(winds,) NRMSE of the worst state, the first 10 s left out."""
-    out = []
-    for run, true in zip(found, runs("dop853", 0.025), strict=True):
-        assert run.diverged_at is None
-        away = np.sqrt(((run.state[100:] - true.state[100:]) ** 2).mean(axis=0))
-        out.append(float((away / np.ptp(true.state[100:], axis=0)).max()))
-    return np.array(out)
+from fatigue_runner.wind import ConstantWind
 
 
 def test_the_hybrid_is_never_worse_than_its_method_and_mostly_much_better():

@@ -7,6 +7,9 @@ wind_bins          mean winds [m/s], a list or `{start, stop, count}`: a map for
 generator_damping  added to the linear part's [1/s] (default 0)
 guard              norm (`max`, `rms`), kappa (2), quantile (0.999; 1: the largest), rtol (0); compared with the method as it is
                    and with what was predicted; what is refused is made anew in substeps of RK4
+ladder             maps for smaller steps as well, which make what is refused before RK4 does: `halvings` (1: half the step; 2: a quarter,
+                   too), `kappa` of the guards above the smallest step (1: strict, since what they refuse costs little), whose own
+                   is that of `guard`; default none
 
 The predictor is fitted first; then runs that are put back on the true trajectory before every step, with the fitted predictor, give the
 rows and defects of the corrector. The samples lie on the trajectories.
@@ -24,16 +27,19 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from fatigue_runner.corrector import features, samples, steps, threshold
+from fatigue_runner.corrector.binding import Binding
 from fatigue_runner.corrector.coordinates import to_fixed
+from fatigue_runner.corrector.corrector import Corrector
 from fatigue_runner.corrector.families.closed_form import ClosedForm
 from fatigue_runner.corrector.guard import Guard
+from fatigue_runner.corrector.header import MOST_RUNGS
 from fatigue_runner.corrector.maps import MultiBladeMap
 from fatigue_runner.corrector.maps.map import place
 from fatigue_runner.corrector.maps.multi_blade import MOST_DAMPING, past_of
 from fatigue_runner.corrector.recipe import Array, GuardRecipe, Learned, Progress, Speeds, speeds_of
 from fatigue_runner.corrector.threshold import limit_of
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.section import problem
+from fatigue_runner.inputs.section import Section, problem
 from fatigue_runner.integrators import multi_blade
 from fatigue_runner.integrators.tableaux import RK4
 
@@ -48,6 +54,13 @@ Numbers = NDArray[np.int64]
 ROUNDING = 1e-6
 
 
+class LadderRecipe(Section):
+    """Smaller steps with maps of their own, see `integrators.step_ladder`."""
+
+    halvings: int = Field(default=1, ge=1, le=MOST_RUNGS)
+    kappa: float = Field(default=1.0, ge=1)
+
+
 class MultiBladeRecipe(ClosedForm):
     """See the module."""
 
@@ -58,6 +71,7 @@ class MultiBladeRecipe(ClosedForm):
     generator_damping: float = Field(default=0.0, ge=0, lt=MOST_DAMPING)
     wind_bins: Speeds | None = None
     guard: GuardRecipe = GuardRecipe()
+    ladder: LadderRecipe | None = None
 
     @field_validator("factors")
     @classmethod
@@ -92,6 +106,32 @@ class MultiBladeRecipe(ClosedForm):
         return self
 
     def train(self, turbine: Turbine, progress: Progress) -> Learned:
+        if self.ladder is None:
+            return self._at_one_step(turbine, progress)
+        strict = self.guard.model_copy(update={"kappa": self.ladder.kappa})
+        count, made = self.ladder.halvings, []
+        for number in range(count + 1):
+            step = self.step / 2**number
+            progress.say(f"steps of {step * 1e3:g} ms")
+            guard = strict if number < count else self.guard
+            made.append(
+                self.model_copy(update={"step": step, "guard": guard})._at_one_step(turbine, progress)
+            )
+        # RK4's steps are as small whichever rung they stand in for
+        finest = made[-1].guard.substeps
+        top, *below = (
+            replace(learned, guard=replace(learned.guard, substeps=finest * 2 ** (count - number)))
+            for number, learned in enumerate(made)
+        )
+        rungs = tuple(self._rung(turbine, number, learned) for number, learned in enumerate(below, start=1))
+        return replace(top, rungs=rungs)
+
+    def _rung(self, turbine: Turbine, number: int, learned: Learned) -> Corrector:
+        binding = Binding.to(turbine, self.method, self.step / 2**number)
+        name = f"{self.name}-rung{number}"
+        return Corrector(name, self.family, binding, learned.map, learned.guard, learned.wind_range)
+
+    def _at_one_step(self, turbine: Turbine, progress: Progress) -> Learned:
         binding = self.bound_to(turbine)
         method, factors, damping = binding.found, tuple(self.factors), self.generator_damping
         layout = multi_blade.seen_by(turbine, max(self.training.harmonics_list) > 1)
