@@ -116,12 +116,16 @@ STANDARD_FAMILY, STANDARD_TURBINE = "affine", "nrel5mw"
 
 
 def standard_recipes(turbine: Turbine | None = None) -> list[Path]:
-    """The shipped recipes that take seconds and are trained anew for every turbine, by name; without those of a turbine that operates
-    where this one has no controller."""
+    """The shipped recipes that are trained anew for every turbine, by name; without ladders, which are several trainings, and without those
+    of a turbine that operates where this one has no controller."""
     found = []
     for path in sorted(shipped.correctors().glob("*.yaml")):
         data = read_mapping(path, "recipe", "name, family, ...").data
-        if data.get("family") != STANDARD_FAMILY or data.get("turbine") != STANDARD_TURBINE:
+        if (
+            data.get("family") != STANDARD_FAMILY
+            or data.get("turbine") != STANDARD_TURBINE
+            or "ladder" in data
+        ):
             continue
         if turbine is None or turbine.control is not None or data.get("operation", FIXED) == FIXED:
             found.append(path)

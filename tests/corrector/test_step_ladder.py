@@ -23,7 +23,7 @@ STEPS = 600  # of 0.1 s in a run
 @cache
 def ladder(top=1.0, below=1.0):
     """The shipped one, its guards' limits times these."""
-    found = find("etdabm3-ladder-operation")
+    found = find("etdabm3-100ms-operation-ladder")
     rungs = tuple(with_limit(rung, below) for rung in found.rungs)
     return replace(with_limit(found, top), rungs=rungs)
 
