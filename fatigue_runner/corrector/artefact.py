@@ -20,6 +20,7 @@ from fatigue_runner.corrector.guard import Guard
 from fatigue_runner.corrector.header import check_header
 from fatigue_runner.corrector.maps import MAPS, map_class
 from fatigue_runner.encoded import refuse_pointer
+from fatigue_runner.errors import InputError
 from fatigue_runner.layout import FAMILIES, T2B1I1CG, Channel, FirstOrder, Layout, family_of
 from fatigue_runner.turbine.turbine import FIXED
 
@@ -130,7 +131,7 @@ def load(path: Path | str) -> Corrector:
             own = {k.removeprefix(first): v for k, v in tensors.items() if k.startswith(first)}
             rungs.append(_corrector(below, own))
         return _corrector(header, tensors, tuple(rungs))
-    except CorrectorError as error:
+    except InputError as error:
         raise CorrectorError(f"{path}: {error}; copy or train it anew") from None
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise CorrectorError(f"{path}: header and arrays do not fit ({error}); train it anew") from None

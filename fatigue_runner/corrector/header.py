@@ -26,7 +26,7 @@ class _Guard(_Checked):
     kappa: float = Field(ge=1)
     quantile: float = Field(gt=0, le=1)
     atol: list[float]
-    rtol: list[float]
+    rtol: list[Annotated[float, Field(ge=0)]]
     substeps: int = Field(default=0, ge=0, le=10_000)
     low: list[float] = []
     high: list[float] = []
@@ -53,6 +53,9 @@ class _Header(_Checked):
     licence: str
     guard: _Guard
     ahead_atol: list[float] = []
+    operation: Literal["fixed", "controlled", "torque-law"] = "fixed"
+    bins: list[Annotated[float, Field(ge=0, le=100)]] = []
+    harmonics: bool = False
     states: list[Word] | None = None
     wind: list[Word] | None = None
     rungs: list[dict[str, Any]] = Field(default=[], max_length=MOST_RUNGS)
@@ -61,6 +64,8 @@ class _Header(_Checked):
     def _range_ascends(self) -> _Header:
         if self.wind_range[0] > self.wind_range[1]:
             raise problem("must go from the lower to the higher speed", key="wind_range")
+        if sorted(set(self.bins)) != self.bins:
+            raise problem("must be mean winds in ascending order", key="bins")
         if (self.states is None) != (self.wind is None):
             raise problem("comes with `wind`, and `wind` with it", key="states")
         return self

@@ -43,6 +43,10 @@ WRONG = {
     "validation": [[], "good"],
     "ahead_atol": [[-1.0], "x"],
     "factors": [{}, 1],
+    "operation": ["sailing", 3],
+    "bins": [["8"], [8, 8], [9, 8], [-1], [True]],
+    "harmonics": ["yes", 1, None],
+    "rungs": [{}, [1], [{}], [{"name": "half"}]],
 }
 CASES = [(key, value) for key, values in WRONG.items() for value in values]
 
@@ -59,7 +63,14 @@ def test_a_wrong_value_is_refused(tmp_path, parts, key, value):
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("limit", -1), ("substeps", -2), ("atol", [0.0] * 16), ("norm", "sum"), ("quantile", 2)],
+    [
+        ("limit", -1),
+        ("substeps", -2),
+        ("rtol", [-1.0] * 16),
+        ("atol", [0.0] * 16),
+        ("norm", "sum"),
+        ("quantile", 2),
+    ],
 )
 def test_so_is_one_of_the_guard(tmp_path, parts, key, value):
     header = copy.deepcopy(parts[2])
@@ -74,6 +85,29 @@ def test_a_header_that_is_none_is_a_sentence(tmp_path, parts, text):
     save_file(parts[0], path, metadata={"format": parts[1], "header": text})
     with pytest.raises(CorrectorError, match="header"):
         load(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("method", "sail"), ("bins", ["8"]), ("step", 0.1), ("guard", {})]
+)
+def test_a_rung_is_looked_at_as_closely(tmp_path, key, value):
+    with safe_open(
+        shipped.correctors() / "etdabm3-100ms-operation-ladder.safetensors", framework="numpy"
+    ) as file:
+        metadata = file.metadata()
+        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+    header = json.loads(metadata["header"])
+    header["rungs"][0][key] = value
+    with pytest.raises(CorrectorError, match=r"own\.safetensors"):
+        load(written(tmp_path, (tensors, metadata["format"]), header))
+    with pytest.raises(CorrectorError, match="do not fit"):
+        load(
+            written(
+                tmp_path,
+                ({k: v for k, v in tensors.items() if "." not in k}, metadata["format"]),
+                json.loads(metadata["header"]),
+            )
+        )
 
 
 def test_an_array_with_no_number_is_refused(tmp_path, parts):
