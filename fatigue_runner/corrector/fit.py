@@ -36,13 +36,18 @@ def robust(features: Array, defects: Array, ridge: float = 1e-12, watched: tuple
     """
     weights = affine(features, defects, ridge)
     for _ in range(ROUNDS):
-        left = np.abs(defects - features @ weights.T)
-        usual = np.median(left, axis=0)
-        usual[usual == 0] = 1.0
-        size = (left / usual)[:, list(watched) or slice(None)].max(axis=1)
-        by = (1.0 / np.sqrt(1.0 + (size / KNEE) ** 2))[:, None]
+        by = trust(defects - features @ weights.T, watched)[:, None]
         weights = affine(features * by, defects * by, ridge)
     return weights
+
+
+def trust(left: Array, watched: tuple[int, ...] = ()) -> Array:
+    """(n,) Huber's weights of steps by what a fit leaves of them (n, outputs), see `robust`."""
+    left = np.abs(left)
+    usual = np.median(left, axis=0)
+    usual[usual == 0] = 1.0
+    size = (left / usual)[:, list(watched) or slice(None)].max(axis=1)
+    return np.asarray(1.0 / np.sqrt(1.0 + (size / KNEE) ** 2))
 
 
 def relative_residual(prediction: Array, defects: Array) -> Array:

@@ -39,12 +39,13 @@ class RefineRecipe(Section):
 
 @dataclass(frozen=True)
 class Ground:
-    """What rollouts run on: winds, their initial states (n, states), samples of each, seed."""
+    """What rollouts run on: winds, their initial states (n, states), samples of each, seed, how many samples lie in a row."""
 
     winds: list[Any]
     start: Any
     per_wind: int
     seed: int
+    length: int = 1
 
 
 def visited(
@@ -53,7 +54,7 @@ def visited(
     """Samples at the states of the corrected method's own runs; None where every run diverged."""
     step = corrector.step
     # whole steps: between them lie values that the method never stepped from
-    output = step if corrector.history else step * max(1, round(samples.GRID / step))
+    output = step if corrector.history or ground.length > 1 else step * max(1, round(samples.GRID / step))
     ensemble = Ensemble(turbine, ground.winds, ground.start, duration, output)
     found = simulate(ensemble, Integrator(corrector.method, step, corrector))
     whole = [(wind, run) for wind, run in zip(ground.winds, found, strict=True) if run.diverged_at is None]
@@ -61,7 +62,8 @@ def visited(
         return None
     winds, runs = zip(*whole, strict=True)
     return samples.along(
-        turbine, corrector.method, step, winds, runs, ground.per_wind, 0.0, ground.seed + 1000 * number, corrector.history
+        turbine, corrector.method, step, winds, runs, ground.per_wind, 0.0, ground.seed + 1000 * number, corrector.history,
+        ground.length,
     )  # fmt: skip
 
 

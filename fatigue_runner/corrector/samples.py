@@ -158,23 +158,24 @@ def along(
     perturbation: float,
     seed: int,
     history: int = 0,
+    length: int = 1,
 ) -> Samples:
-    """Samples along `runs`, trajectories of the winds at `output_step(step, history)`, half of them moved off it.
+    """Samples along `runs`, trajectories of the winds at `output_step(step, history, length)`, half of them moved off it.
 
-    per_wind samples of each wind at random times; perturbation: standard deviation of the move in units of each state's own (large
-    ones teach another mixture than a corrected run meets: 1e-5 to 1e-4 did best). history: steps looked back.
+    per_wind samples of each wind at random times, `length` of them in a row; perturbation: standard deviation of the move in units of
+    each state's own (large ones teach another mixture than a corrected run meets: 1e-5 to 1e-4 did best). history: steps looked back.
     """
     rng = np.random.Generator(np.random.PCG64(seed))
     scale = np.std(np.concatenate([run.state for run in runs]), axis=0)
     states, pieces, behind = [], [], []
-    count = pieces_of(winds, step, output_step(step, history))
+    count = pieces_of(winds, step, output_step(step, history, length))
     for wind, run in zip(winds, runs, strict=True):
         last = int(np.searchsorted(run.time, run.time[-1] - step - 1e-9))
         if last <= history:
             raise InputError(
                 f"training wind {wind.name}: {run.time[-1]:g} s hold no step of {step:g} s; make it longer"
             )
-        pick = rng.integers(history, last, per_wind)
+        pick = places(rng, history, last, per_wind, length, wind, step)
         x = run.state[pick].copy()
         moved = slice(0, None, 2)
         x[moved] += moves(rng, x[moved].shape, scale, perturbation, turbine)
@@ -193,9 +194,25 @@ def along(
     return out
 
 
-def output_step(step: float, history: int) -> float:
-    """Sampling [s] of the trajectories that `along` needs: a corrector that looks back needs its own steps."""
-    return step if history else GRID
+def places(
+    rng: np.random.Generator, low: int, high: int, count: int, length: int, wind: Any, step: float
+) -> NDArray[np.int64]:
+    """(count,) random places from low to below high, `length` in a row each: so many windows as the count holds, at least one.
+
+    Raises InputError where not even one finds room under the wind.
+    """
+    if high - low < length:
+        raise InputError(
+            f"training wind {wind.name}: too short for {length} steps of {step:g} s in a row; make its duration longer, or give a "
+            "shorter horizon"
+        )
+    starts = rng.integers(low, high - length + 1, max(1, count // length))
+    return np.asarray((starts[:, None] + np.arange(length)).ravel())
+
+
+def output_step(step: float, history: int, length: int = 1) -> float:
+    """Sampling [s] of the trajectories that `along` needs: a corrector that looks back, and steps in a row, need its own steps."""
+    return step if history or length > 1 else GRID
 
 
 def moves(

@@ -24,6 +24,7 @@ from fatigue_runner.corrector.coordinates import (
     relative_to_fixed,
     turn_of,
 )
+from fatigue_runner.corrector.samples import places
 from fatigue_runner.integrators.linear_part import linearisation_point
 from fatigue_runner.layout import WIND
 
@@ -82,16 +83,21 @@ def collect(
     damping: float,
     learned_ahead: Callable[[float], Array] | None,
     bins: tuple[float, ...] = (),
+    length: int = 1,
 ) -> Steps:
-    """Steps from random places of true trajectories `runs`, sampled every `step` [s]; learned_ahead: (states, rows) part of the predictor
-    for a mean wind [m/s], which may differ between the nearest of `bins`; damping [1/s]: see `multi_blade.linear`."""
+    """Steps from random places of true trajectories `runs`, sampled every `step` [s], `length` of them in a row; learned_ahead: (states,
+    rows) part of the predictor for a mean wind [m/s], which may differ between the nearest of `bins`; damping [1/s]: see
+    `multi_blade.linear`."""
     rng = np.random.Generator(np.random.PCG64(seed))
-    picks = [rng.integers(past + WARM, len(run.time) - 1, per_wind) for run in runs]
+    first = past + WARM
+    picks = [
+        places(rng, first, len(run.time) - 1, per_wind, length, wind, step)
+        for wind, run in zip(winds, runs, strict=True)
+    ]
     for pick, run in zip(picks, runs, strict=True):
-        early = pick[::BEGINNING]
-        early[:] = rng.integers(
-            past + WARM, min(past + WARM + round(BEGUN / step), len(run.time) - 1), len(early)
-        )
+        early = pick.reshape(-1, length)[::BEGINNING]
+        last = min(first + round(BEGUN / step), len(run.time) - length)
+        early[:] = rng.integers(first, last, len(early))[:, None] + np.arange(length)
     kinds: dict[tuple[float, float], list[int]] = {}  # winds that share their matrices
     for i, w in enumerate(winds):
         nearest = min(bins, key=lambda b: abs(b - w.mean_speed), default=0.0)

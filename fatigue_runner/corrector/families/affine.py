@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from fatigue_runner.corrector import features, rollouts, samples, threshold
@@ -22,6 +23,8 @@ from fatigue_runner.corrector.guard import open_guard
 from fatigue_runner.corrector.judging import Judge, median_error
 from fatigue_runner.corrector.maps import StageMap
 from fatigue_runner.corrector.recipe import GuardRecipe, Learned, Progress
+from fatigue_runner.corrector.trajectory_loss import Windows, modes
+from fatigue_runner.integrators.linear_part import linearisation_point
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
@@ -57,34 +60,40 @@ class AffineRecipe(ClosedForm):
     def train(self, turbine: Turbine, progress: Progress) -> Learned:
         return self.guarded(turbine, self.fitted(turbine, progress), progress)
 
-    def sampled(self, turbine: Turbine, winds: list[Any], duration: float, seed: int) -> samples.Samples:
-        """Samples under these winds."""
-        grid = samples.output_step(self.step, self.history)
+    def sampled(
+        self, turbine: Turbine, winds: list[Any], duration: float, seed: int, length: int = 1
+    ) -> samples.Samples:
+        """Samples under these winds, `length` of them in a row."""
+        grid = samples.output_step(self.step, self.history, length)
         runs = samples.references(turbine, winds, self.starts(turbine, winds), duration, grid)
         return samples.along(
-            turbine, self.method, self.step, winds, runs, self.samples, self.perturbation, seed, self.history
-        )
+            turbine, self.method, self.step, winds, runs, self.samples, self.perturbation, seed, self.history, length
+        )  # fmt: skip
 
     def fitted(self, turbine: Turbine, progress: Progress) -> Fitted:
         """The map, refined where the recipe asks for that."""
         winds = self.training.build()
         progress.say(f"reference trajectories under {len(winds)} winds")
-        found = self.sampled(turbine, winds, self.training.duration, self.seed)
+        length = self.length(turbine)
+        found = self.sampled(turbine, winds, self.training.duration, self.seed, length)
         speeds = found.raw[:, -1]
         wind_range = float(speeds.min()), float(speeds.max())
         progress.say(f"fitting {len(found.plain)} steps")
-        size = self.bound_to(turbine).size
+        size, windows = self.bound_to(turbine).size, None
+        if length > 1:
+            point = linearisation_point(turbine, float(np.median(self.training.speed_list)))
+            windows = Windows(modes(turbine, self.step, False, point=point), length)
 
         def fit(seen: samples.Samples) -> StageMap:
             factors = tuple(self.factors)
             rows = seen.multiplied(features.factor_rows(turbine.layout, factors))
-            weights = self.solve(turbine.layout, rows, seen.defect) / size
-            return StageMap(weights, factors=factors, history=self.history, layout=turbine.layout)
+            weights = self.solve(turbine.layout, rows, seen.defect, windows)
+            return StageMap(weights / size, factors=factors, history=self.history, layout=turbine.layout)
 
         learned = fit(found)
-        facts: dict[str, Any] = {"winds": len(winds), "seed": self.seed}
+        facts: dict[str, Any] = {"winds": len(winds), "seed": self.seed, **self.said_of_loss(length)}
         if self.refine is not None:
-            ground = rollouts.Ground(winds, self.starts(turbine, winds), self.samples, self.seed)
+            ground = rollouts.Ground(winds, self.starts(turbine, winds), self.samples, self.seed, length)
             long = self.refine.duration or self.training.duration
             learned, found, more = rollouts.refine(
                 learned, found, self.refine.rounds, fit,
@@ -95,10 +104,13 @@ class AffineRecipe(ClosedForm):
         return Fitted(learned, found, wind_range, {"samples": len(found.plain), **facts})
 
     def guarded(self, turbine: Turbine, made: Fitted, progress: Progress) -> Learned:
-        """The map with the threshold that its samples give."""
+        """The map with the threshold that its samples give; steps in a row are too few different ones, and others are drawn."""
         progress.say("acceptance threshold")
+        seen = made.samples
+        if self.length(turbine) > 1:
+            seen = self.sampled(turbine, self.training.build(), self.training.duration, self.seed)
         guard = threshold.from_training_set(
-            made.map, self.bound_to(turbine), turbine, made.samples, **self.guard.threshold, substeps=self.guard.substeps
+            made.map, self.bound_to(turbine), turbine, seen, **self.guard.threshold, substeps=self.guard.substeps
         )  # fmt: skip
         return Learned(made.map, guard, made.wind_range, made.facts)
 

@@ -12,7 +12,8 @@ ladder             maps for smaller steps as well, which make what is refused be
                    is that of `guard`; default none
 
 The predictor is fitted first; then runs that are put back on the true trajectory before every step, with the fitted predictor, give the
-rows and defects of the corrector. The samples lie on the trajectories.
+rows and defects of the corrector. The samples lie on the trajectories. With loss `trajectory` both are fitted
+to it: what the predictor errs by comes back through the nonlinear part at the predicted place.
 """
 
 from __future__ import annotations
@@ -38,9 +39,11 @@ from fatigue_runner.corrector.maps.map import place
 from fatigue_runner.corrector.maps.multi_blade import MOST_DAMPING, past_of
 from fatigue_runner.corrector.recipe import Array, GuardRecipe, Learned, Progress, Speeds, speeds_of
 from fatigue_runner.corrector.threshold import limit_of
+from fatigue_runner.corrector.trajectory_loss import Windows, modes
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.section import Section, problem
 from fatigue_runner.integrators import multi_blade
+from fatigue_runner.integrators.linear_part import linearisation_point
 from fatigue_runner.integrators.tableaux import RK4
 
 if TYPE_CHECKING:
@@ -140,27 +143,43 @@ class MultiBladeRecipe(ClosedForm):
         # whole steps: a sampled one begins at a step's end
         duration = float(np.floor(self.training.duration / self.step + 1e-9) * self.step)
         runs = samples.references(turbine, winds, self.starts(turbine, winds), duration, self.step)
+        length = self.length(turbine)
         sampled = partial(
             steps.collect, turbine, method, self.step, past_of(method, self.history), winds, runs, self.samples, self.seed, damping
         )  # fmt: skip
 
+        def windows(chosen: Numbers) -> Windows | None:
+            if length == 1:
+                return None
+            point = linearisation_point(turbine, float(np.median(found.speeds[chosen])))
+            azimuth = np.arctan2(found.turn[1][chosen], found.turn[0][chosen])
+            return Windows(modes(turbine, self.step, True, damping, point), length, azimuth)
+
         def fitted(seen: Array, defect: Array) -> list[Array]:
             turned = to_fixed(layout, defect, found.turn)
             seen = np.where(np.sqrt((seen**2).mean(axis=0)) < ROUNDING, 0.0, seen)
-            return self.in_bins(found.speeds, lambda chosen: self.solve(layout, seen[chosen], turned[chosen]))
+            return self.in_bins(
+                found.speeds, lambda chosen: self.solve(layout, seen[chosen], turned[chosen], windows(chosen))
+            )
+
+        def learned_ahead(speed: float) -> Array:
+            return ahead[place(self.bins, speed)]
 
         progress.say(f"fitting the predictor to {len(winds) * self.samples} steps")
-        found = sampled(None)
+        found = sampled(None, length=length)
         ahead = fitted(found.ahead_rows, found.ahead_defect)
         progress.say("fitting the corrector")
-        found = sampled(lambda speed: ahead[place(self.bins, speed)], self.bins)
+        found = sampled(learned_ahead, self.bins, length)
         seen = found.multiplied(features.multi_blade_factor_rows(layout, factors))
         learned = fitted(seen, found.defect)
         substeps = threshold.fallback_substeps(turbine, RK4.name, self.step, 1)
         speeds = np.concatenate([run.wind[:, 0] for run in runs])
         facts: dict[str, Any] = {"samples": len(seen), "winds": len(winds), "seed": self.seed}
+        facts |= self.said_of_loss(length)
         first, second = ((np.stack(w) if self.bins else w[0]) / binding.size for w in (ahead, learned))
         matrices = MultiBladeMap(first, second, factors, self.history, damping, layout, self.bins)
+        if length > 1:  # for the threshold steps in a row are too few different ones
+            found = sampled(learned_ahead, self.bins)
         guard = self._guard(matrices, binding.size, found, substeps)
         return Learned(matrices, guard, (float(speeds.min()), float(speeds.max())), facts)
 

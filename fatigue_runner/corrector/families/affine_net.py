@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from fatigue_runner.corrector.families.affine import AffineRecipe
 from fatigue_runner.corrector.features import drive
@@ -26,7 +26,7 @@ from fatigue_runner.corrector.network.pairs import Pairs
 from fatigue_runner.corrector.network.settings import Hidden, NetworkSettings
 from fatigue_runner.corrector.recipe import Array, Learned, Progress
 from fatigue_runner.corrector.samples import Samples
-from fatigue_runner.inputs.section import Section
+from fatigue_runner.inputs.section import Section, problem
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
@@ -62,6 +62,16 @@ class AffineNetRecipe(AffineRecipe):
 
     family: Literal["affine+net"]  # type: ignore[assignment]  # another name of the same kind
     network: NetworkRecipe
+
+    @field_validator("loss")
+    @classmethod
+    def _of_single_steps(cls, value: str) -> str:
+        if value != "defect":
+            raise problem(
+                f"family affine+net knows `defect` alone, since its network learns what is left of single steps; got {value!r}; "
+                "leave it out, or use family affine"
+            )
+        return value
 
     def train(self, turbine: Turbine, progress: Progress) -> Learned:
         made = self.fitted(turbine, progress)
