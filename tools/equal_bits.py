@@ -3,6 +3,7 @@
 python tools/equal_bits.py              against the last tag
 python tools/equal_bits.py 2ae44e5      against a revision
 python tools/equal_bits.py --tree DIR   against a source tree
+python tools/equal_bits.py --python .venv313/bin/python   the working tree under another Python, which has the dependencies
 python tools/equal_bits.py --only 'method rk4*varying'
 
 The same figures (tools/bit_figures.py: trajectories, loads and step figures of every method, corrector and kind of start; results and
@@ -115,10 +116,10 @@ def _count(found: list[Verdict], same: bool) -> int:
     return sum(verdict.same is same for verdict in found)
 
 
-def make_figures(tree: Path, out: Path, pattern: str) -> dict[str, Any]:
+def make_figures(tree: Path, out: Path, pattern: str, python: str) -> dict[str, Any]:
     """{name: what the tree told of the figure}; exits where the tree's process fails as a whole."""
     told: dict[str, Any] = {}
-    process = start(tree, FIGURES, [str(tree), str(out), pattern])
+    process = start(tree, FIGURES, [str(tree), str(out), pattern], python)
     assert process.stdout is not None
     for line in process.stdout:
         figure = json.loads(line)
@@ -138,15 +139,21 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--only", default="", metavar="PATTERN", help="figures whose names match it, * for anything"
     )
+    parser.add_argument(
+        "--python", metavar="PROGRAM", help="the working tree under this Python, instead of a revision"
+    )
     given = parser.parse_args(arguments)
-    name, base = base_tree(given)
+    if given.python and (given.revision or given.tree):
+        sys.exit("give a revision, --tree or --python")
+    name, base = (given.python, ROOT) if given.python else base_tree(given)
+    pythons = {"old": given.python or sys.executable, "new": sys.executable}
     with tempfile.TemporaryDirectory() as made:
         folders = {side: Path(made) / side for side in ("old", "new")}
         told = {}
         for side, tree in (("old", base), ("new", ROOT)):
             folders[side].mkdir()
             began = time.perf_counter()
-            told[side] = make_figures(tree, folders[side], given.only)
+            told[side] = make_figures(tree, folders[side], given.only, pythons[side])
             label = name if side == "old" else "the working tree"
             print(f"{len(told[side])} figures of {label} in {time.perf_counter() - began:.0f} s", flush=True)
         found = list(verdicts(told["old"], told["new"], folders))

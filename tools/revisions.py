@@ -76,7 +76,9 @@ def _extracted(revision: str) -> Path:
     return folder
 
 
-def start(tree: Path, script: Path, arguments: Sequence[str], **options: object) -> subprocess.Popen[str]:
+def start(
+    tree: Path, script: Path, arguments: Sequence[str], python: str = sys.executable, **options: object
+) -> subprocess.Popen[str]:
     """Start a Python script that imports the package of `tree`, one thread, its standard output as text."""
     environment = {
         **os.environ,
@@ -86,7 +88,7 @@ def start(tree: Path, script: Path, arguments: Sequence[str], **options: object)
     if tree != ROOT:
         # the package drops the oldest of its kernels' folders: here the ones of the revision stay, whatever else is compiled
         environment.setdefault("NUMBA_CACHE_DIR", str(_cache() / "revisions" / "kernels"))
-    command = [sys.executable, str(script), *arguments]
+    command = [python, str(script), *arguments]
     return subprocess.Popen(command, env=environment, text=True, stdout=subprocess.PIPE, **options)  # type: ignore[call-overload]
 
 

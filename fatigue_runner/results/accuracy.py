@@ -44,7 +44,7 @@ class Accuracy:
     @property
     def nrmse_mean(self) -> float:
         """Mean over the states."""
-        return sum(self.nrmse.values()) / len(self.nrmse)
+        return math.fsum(self.nrmse.values()) / len(self.nrmse)  # `sum` rounds otherwise since Python 3.12
 
     def to_dict(self) -> dict[str, float]:
         """The results table's columns: nrmse_max, nrmse_mean, delta_e, delta_e_range, then nrmse_<state>."""

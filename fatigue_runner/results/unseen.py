@@ -59,7 +59,7 @@ def unseen(rows: Sequence[Row]) -> Unseen | None:
 
 
 def _mean(values: list[float]) -> float | None:
-    return sum(values) / len(values) if values else None
+    return math.fsum(values) / len(values) if values else None
 
 
 def _share(value: float) -> str:

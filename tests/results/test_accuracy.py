@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from fatigue_runner.channels import STATE_NAMES
 from fatigue_runner.errors import InputError
-from fatigue_runner.results.accuracy import compare
+from fatigue_runner.results.accuracy import Accuracy, compare
 from fatigue_runner.trajectory import Trajectory
 
 N = 401
@@ -49,6 +49,11 @@ def test_nrmse_is_the_rms_error_over_the_range_of_the_reference_state():
     assert found.nrmse_max == found.nrmse["blade2_flap"]
     assert found.nrmse_mean == pytest.approx(0.011 / 16, rel=1e-12)
     assert found.delta_e_range == pytest.approx((0.001**2 + 0.01**2) / 16, rel=1e-12)
+
+
+def test_the_mean_over_the_states_is_rounded_once_in_every_python():
+    # `sum` gives 0.9999999999999999 up to Python 3.11, and 1.0 from 3.12 on
+    assert Accuracy(dict.fromkeys(STATE_NAMES[:10], 0.1), 0.0, 0.0).nrmse_mean == 0.1
 
 
 def test_an_azimuth_is_measured_by_the_angle_it_turned():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -261,7 +262,7 @@ def _mode(file: DeckFile, stem: str, notes: list[str]) -> list[float] | None:
         notes.append(f"{file.path.name} has no mode {stem}: it follows from mass and stiffness")
         return None
     values = [file.number(f"{stem}({power})") for power in SHAPE]
-    total = sum(values)
+    total = math.fsum(values)
     if abs(total - 1) <= 1e-3:  # as it stands: ElastoDyn takes it so, too
         return values
     if not 0.9 < total < 1.1:
