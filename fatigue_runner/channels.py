@@ -215,8 +215,3 @@ BY_NAME = _Known((c.name, c) for c in (*STATES, *T2B2CG.states, *_OF_WIND, *LOAD
 def wind_channels(columns: int) -> tuple[Channel, ...]:
     """The signals of a wind (n, columns), columns = 3 + 2 M: speed and shears, then the harmonics' pairs c_1, s_1, c_2, ..."""
     return (*WIND_SIGNALS, *WIND_HARMONICS)[:columns]
-
-
-def wind_names(columns: int) -> tuple[str, ...]:
-    """Their names."""
-    return tuple(c.name for c in wind_channels(columns))

@@ -204,9 +204,9 @@ def _print_outcome(results: Results, console: Console) -> None:
     from fatigue_runner.report.terminal import print_life, print_ranking
 
     console.print()
-    print_ranking(results.rows, console)
+    print_ranking(results, console)
     if results.life is not None:
-        print_life(results.life, results.rows, console)
+        print_life(results.life, results.summaries, console)
     for sentence in results.notes:
         console.print(escape(sentence), style="yellow")
     for row in results.lost[:10]:

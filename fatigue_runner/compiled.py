@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import hashlib
 import multiprocessing
-import os
 import pickle
 import re
 import tempfile
 import warnings
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ import numba
 from numba.core import config as numba_config
 from numba.core.caching import IndexDataCacheFile
 
+from fatigue_runner.caches import cache_base
 from fatigue_runner.errors import FatigueRunnerWarning
 
 # `nnan` lets LLVM assume that there is no NaN: no divergence check may stand in a function compiled with it.
@@ -42,6 +43,7 @@ INLINE: dict[str, Any] = {**LEAN, "forceinline": True}
 
 config: Any = numba_config  # its attributes are set at import, which no type checker sees
 
+_tells: list[bool] = []  # whether this process is a worker that speaks for all
 _KEPT = 8  # cache folders of earlier versions that stay
 _IMPORT = re.compile(
     rb"^(?:from (fatigue_runner[\w.]*) import (\([^)]*\)|[^\n(]*)|import (fatigue_runner[\w.]*))", re.M
@@ -54,11 +56,9 @@ def cache_folder() -> Path:
     digest = hashlib.sha256(numba.__version__.encode())
     for path in compiled_sources(Path(__file__).parent):
         digest.update(path.read_bytes())
-    base = config.CACHE_DIR or os.path.join(
-        os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "fatigue-runner"
-    )
-    _prune(Path(base))
-    return Path(base) / f"kernels-{digest.hexdigest()[:16]}"
+    base = cache_base()
+    _prune(base)
+    return base / f"kernels-{digest.hexdigest()[:16]}"
 
 
 def compiled_sources(package: Path) -> list[Path]:
@@ -186,13 +186,28 @@ def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Callable[.
     return made
 
 
-@cache
+@contextmanager
+def telling() -> Iterator[None]:
+    """Within it a worker warns, too: for a process that has its kernels compiled there."""
+    _tells.append(True)
+    try:
+        if not _writable():
+            _warn_once()
+        yield
+    finally:
+        _tells.pop()
+
+
 def _warn_once() -> None:
-    if multiprocessing.parent_process() is not None:
-        return  # a worker: the run's own process has said it
+    if multiprocessing.parent_process() is None or _tells:
+        _warn()  # of workers one tells it for all
+
+
+@cache
+def _warn() -> None:
     warnings.warn(
         f"the kernel cache {cache_folder()} cannot be written: kernels are compiled anew in every process (seconds); "
         "set NUMBA_CACHE_DIR to a writable folder",
         FatigueRunnerWarning,
-        stacklevel=4,
+        stacklevel=5,
     )

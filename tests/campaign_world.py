@@ -71,10 +71,10 @@ def build_world(monkeypatch: Any) -> World:
     monkeypatch.setattr(integrators, "simulate", simulate)
     monkeypatch.setattr(integrators, "stability_limit", lambda turbine, method: 0.2)
     monkeypatch.setattr(turbines, "load_turbine", lambda name: turbine)
-    from fatigue_runner.campaign import block, run
+    from fatigue_runner.campaign import block, prepare, run
 
     # the toy's reference is exact, and its calls are counted
-    monkeypatch.setattr(run, "reference_facts", lambda plan, earlier: {})
+    monkeypatch.setattr(prepare, "reference_facts", lambda resolved, earlier: {})
     monkeypatch.setattr(run, "warm_up", lambda job: None)
     block._turbine.cache_clear()
     monkeypatch.setattr(block, "_turbine", lambda source, expected_hash, operation: turbine)

@@ -23,6 +23,7 @@ FLOOR = {
     "naming",
     "trajectory",
     "compiled",
+    "caches",
     "terminal",
     "values",
     "encoded",

@@ -66,7 +66,7 @@ def test_the_table_has_costs_errors_and_a_verdict_per_integrator(world, call, tm
 def test_progress_is_told_line_by_line_where_there_is_no_terminal(world, call, tmp_path):
     _, out, _ = call("run", write_campaign(tmp_path))
     told = [line.strip() for line in out.splitlines() if line.strip().endswith("...")]
-    assert [line.split()[0] for line in told] == ["reading", "loading", "checking", "running", "writing"]
+    assert [line.split()[0] for line in told] == ["reading", "loading", "running", "writing"]
 
 
 def test_run_into_the_same_folder_says_what_it_kept(world, call, tmp_path):
@@ -143,7 +143,7 @@ def test_an_interruption_before_anything_ran_ends_with_130_too(call, tmp_path, m
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fatigue_runner.campaign.run.make_plan", interrupt)
+    monkeypatch.setattr("fatigue_runner.campaign.run.read_plan", interrupt)
     assert call("run", write_campaign(tmp_path))[0] == 130
 
 
@@ -183,7 +183,7 @@ def test_a_bug_is_told_as_one_without_a_traceback(call, tmp_path, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr("fatigue_runner.campaign.run.make_plan", broken)
+    monkeypatch.setattr("fatigue_runner.campaign.run.read_plan", broken)
     code, out, err = call("run", write_campaign(tmp_path))
     assert code == 1
     assert err.startswith("internal error: ZeroDivisionError: division by zero; please report it")

@@ -103,7 +103,7 @@ def test_a_full_disk_does_not_end_a_kernel(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(IndexDataCacheFile, "save", full)
-    compiled._warn_once.cache_clear()
+    compiled._warn.cache_clear()
 
     @njit()
     def triple(x):

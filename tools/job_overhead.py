@@ -33,10 +33,8 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=200)
     asked = parser.parse_args()
     plan = make_plan(asked.campaign)
-    resolved, out = plan.resolved, Path("no such folder")
-    setup = Setup(
-        plan.campaign, resolved.turbine_source, resolved.turbine.hash, resolved.turbine.layout.states, out
-    )
+    named, out = plan.named, Path("no such folder")
+    setup = Setup(plan.campaign, named.turbine_source, named.turbine.hash, named.turbine.layout.states, out)
     job = max(plan.jobs(Store(out, plan.identity), setup, 1), key=lambda job: len(job.cases))
     cluster = Cluster(asked.dask) if asked.dask else None
     with nullcontext() if cluster is None else cluster:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fatigue_runner._version import __version__
 from fatigue_runner.campaign.provenance import LIBRARIES
-from fatigue_runner.campaign.resolve import HIGHEST_WIND_SPEED, Resolved
+from fatigue_runner.campaign.resolve import HIGHEST_WIND_SPEED, Named, Resolved
 from fatigue_runner.campaign.spec import IntegratorSection
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.files import to_yaml
@@ -21,14 +21,14 @@ from fatigue_runner.inputs.source import Place
 from fatigue_runner.turbine.rated import rated_rotor_speed
 
 
-def about(resolved: Resolved) -> dict[str, str]:
+def about(named: Named) -> dict[str, str]:
     """Facts by name, as text: campaign, turbine, turbine_hash, versions, machine."""
     versions = [f"fatigue-runner {__version__}", *(f"{name} {metadata.version(name)}" for name in LIBRARIES)]
-    rated = rated_rotor_speed(resolved.turbine)
+    rated = rated_rotor_speed(named.turbine)
     return {
-        "campaign": resolved.campaign.name,
-        "turbine": resolved.turbine.name,
-        "turbine_hash": resolved.turbine.hash,
+        "campaign": named.campaign.name,
+        "turbine": named.turbine.name,
+        "turbine_hash": named.turbine.hash,
         "rated_rotor_speed": "" if rated is None else f"{rated:.9g}",
         "versions": ", ".join([*versions, f"Python {platform.python_version()}"]),
         "machine": f"{_processor()}, {os.cpu_count()} cores, {platform.system()}",
@@ -97,32 +97,30 @@ def _processor() -> str:
     return next(named, platform.machine())
 
 
-def resolved_yaml(resolved: Resolved) -> str:
+def resolved_yaml(named: Named) -> str:
     """The campaign with every default written out, as YAML that can be run again from anywhere."""
-    data = resolved.campaign.model_dump(exclude={"wind", "integrators", "reference"})
-    if resolved.campaign.operation != "fixed":
+    data = named.campaign.model_dump(exclude={"wind", "integrators", "reference"})
+    if named.campaign.operation != "fixed":
         del data["pitch"]  # the turbine makes it itself; given beside that it is refused
-    data["turbine"] = resolved.turbine_source
-    data["wind"] = resolved.campaign.wind.resolved(Place(resolved.source, ("wind",)))
-    files = {found.path: found.file for found in resolved.integrations}
+    data["turbine"] = named.turbine_source
+    data["wind"] = named.campaign.wind.resolved(Place(named.source, ("wind",)))
+    files = {found.path: found.file for found in named.integrations}
     data["integrators"] = [
         _resolved_integrator(item, files[("integrators", index)])
-        for index, item in enumerate(resolved.campaign.integrators)
+        for index, item in enumerate(named.campaign.integrators)
     ]
-    data["reference"] = (
-        None if resolved.campaign.reference is None else resolved.campaign.reference.model_dump()
-    )
+    data["reference"] = None if named.campaign.reference is None else named.campaign.reference.model_dump()
     return to_yaml("The campaign of this run folder, with every default written out.", data)
 
 
-def turbine_yaml(resolved: Resolved) -> str:
+def turbine_yaml(named: Named) -> str:
     """The turbine's file with what it is based on; of its aerodynamic tables the name only, their content is in the hash."""
     from fatigue_runner.turbine.file import read_turbine_file
 
-    data = read_turbine_file(resolved.turbine_source)
+    data = read_turbine_file(named.turbine_source)
     aero = data.get("aerodynamics", {})
     data["aerodynamics"] = aero | {key: Path(aero[key]).name for key in ("tables", "airfoils") if key in aero}
-    return to_yaml(f"The turbine of this run, hash {resolved.turbine.hash}.", data)
+    return to_yaml(f"The turbine of this run, hash {named.turbine.hash}.", data)
 
 
 def _resolved_integrator(item: IntegratorSection, file: str) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from fatigue_runner.campaign.integration import Integration
 from fatigue_runner.campaign.provenance import code_hash
-from fatigue_runner.campaign.resolve import Resolved
+from fatigue_runner.campaign.resolve import Named
 from fatigue_runner.errors import InputError
 from fatigue_runner.naming import LONGEST_NAME, joined
 from fatigue_runner.wind.section import Realisation
@@ -42,36 +42,36 @@ def log_precision(case: Case, campaign: Campaign) -> str:
     return "float64" if case.integration.is_reference else campaign.log.precision
 
 
-def make_cases(resolved: Resolved) -> list[Case]:
+def make_cases(named: Named) -> list[Case]:
     """All cases of a campaign, wind by wind, the reference of a wind first."""
-    campaign = resolved.campaign
+    campaign = named.campaign
     common = campaign.model_dump(include={"duration", "output_rate", "initial", "pitch"})
     evaluation = campaign.model_dump(include={"fatigue", "discard", "loads"}) | {
         "log": campaign.log.model_dump(exclude={"enabled", "cases"})
     }
     evaluation["walls"] = {
-        place: [wall.circle.diameter, wall.circle.wall] for place, wall in resolved.walls.items()
+        place: [wall.circle.diameter, wall.circle.wall] for place, wall in named.walls.items()
     }
     shared = {
         "code": code_hash(),
-        "turbine": resolved.turbine.hash,
-        "watched": resolved.turbine.watched,
+        "turbine": named.turbine.hash,
+        "watched": named.turbine.watched,
         **common,
         # what its log holds of it
         "log": campaign.log.model_dump(include={"precision", "topics", "channels"}),
     }
     of_all, of_evaluation = hashlib.sha256(_text(shared)), hashlib.sha256(_text(evaluation))
-    integrations = [(found, _text(found.identity)) for found in resolved.integrations]
+    integrations = [(found, _text(found.identity)) for found in named.integrations]
     cases = []
-    for wind in resolved.winds:
-        reference_hash, of_wind = "", _more(of_all, _text(wind.named.identity))
+    for wind in named.realisations:
+        reference_hash, of_wind = "", _more(of_all, _text(wind.identity))
         for integration, identity in integrations:
-            case_id = joined(wind.named.id, integration.id)
+            case_id = joined(wind.id, integration.id)
             simulation_hash = _more(of_wind, identity).hexdigest()
             reference_hash = simulation_hash if integration.is_reference else reference_hash
             record = [simulation_hash, reference_hash, integration.is_reference, case_id]
             whole = _more(of_evaluation, _text(record)).hexdigest()
-            cases.append(Case(case_id, wind.named, integration, simulation_hash, whole))
+            cases.append(Case(case_id, wind, integration, simulation_hash, whole))
     _refuse_same_names(cases)
     _refuse_long_names(cases)
     return cases

@@ -11,7 +11,7 @@ from typing import Any
 from fatigue_runner.campaign.block import Job, run_block
 from fatigue_runner.campaign.plan import make_plan
 from fatigue_runner.campaign.pool import run_jobs
-from fatigue_runner.campaign.store import Store
+from fatigue_runner.campaign.store import ANSWER, Store
 from fatigue_runner.errors import FatigueRunnerError, InputError, did_you_mean
 from fatigue_runner.interruption import end_if_asked
 from fatigue_runner.results.records import head_of, lines_of
@@ -50,8 +50,8 @@ def make_logs(
             raise InputError(f"{folder}: {_why_not(name, store)}; run the campaign again")
     missing = [name for name in wanted if not store.finished(known[name], logged=True)]
     if missing:
-        settled = store.settled
-        earlier = {key: value for key, value in store.earlier.items() if key not in store.identity}
+        untouched = store.untouched
+        earlier = store.about_earlier
         text = (folder / "campaign.yaml").read_text(encoding="utf-8")
         setup = plan.setup(store.out, earlier.get("facts", {}), text)
         store.open(earlier, text)
@@ -61,8 +61,8 @@ def make_logs(
             write_logs(store, jobs, run_block, processes, None, say)
         finally:
             store.close()
-        if settled:
-            store.settle()  # the results are what they were
+        if untouched:
+            store.settle(store.earlier.get(ANSWER))  # the results are what they were
     return [store.log_path(name) for name in wanted]
 
 

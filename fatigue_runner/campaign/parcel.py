@@ -17,7 +17,7 @@ from typing import Any
 
 from fatigue_runner.campaign.block import Job
 from fatigue_runner.campaign.cases import Case
-from fatigue_runner.campaign.resolve import Resolved
+from fatigue_runner.campaign.resolve import Named
 from fatigue_runner.inputs.files import to_yaml
 from fatigue_runner.wind.fields.on_rotor import files_of
 
@@ -38,19 +38,19 @@ class Parcel:
         return f"fatigue-runner-{digest.hexdigest()[:16]}"
 
 
-def pack(resolved: Resolved) -> Parcel:
+def pack(named: Named) -> Parcel:
     """Everything that workers read: turbine file with what it is based on, its tables and airfoils, correctors, wind files."""
     files: dict[str, bytes] = {}
     places: dict[str, str] = {}
-    if Path(resolved.turbine_source).suffix:
-        places[resolved.turbine_source] = _pack_turbine(resolved.turbine_source, files)
-    for integration in resolved.integrations:
+    if Path(named.turbine_source).suffix:
+        places[named.turbine_source] = _pack_turbine(named.turbine_source, files)
+    for integration in named.integrations:
         if integration.file:
             place = f"correctors/{integration.digest[:16]}/{Path(integration.file).name}"
             files[place] = Path(integration.file).read_bytes()
             places[integration.file] = place
-    for wind in resolved.winds:
-        for path in _files_of(wind.named.parameters, wind.named.contents):
+    for wind in named.realisations:
+        for path in _files_of(wind.parameters, wind.contents):
             # below the folder they lie as they do here: a description names what is beside it
             beside = files_of(path)
             for file in beside:

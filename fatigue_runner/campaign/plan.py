@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fatigue_runner.campaign.about import turbine_yaml
+from fatigue_runner.campaign.about import resolved_yaml, turbine_yaml
 from fatigue_runner.campaign.block import Job, Setup
 from fatigue_runner.campaign.bounds import winds_in_memory
 from fatigue_runner.campaign.cases import Case, blocks, log_precision, make_cases
-from fatigue_runner.campaign.check import check
 from fatigue_runner.campaign.kept_logs import ALL, FEW, NONE, Kept, KeptLogs, at_once, chosen
+from fatigue_runner.campaign.prepare import Prepared, prepared
 from fatigue_runner.campaign.provenance import code_hash
-from fatigue_runner.campaign.resolve import Resolved, ResolvedWind, resolve
+from fatigue_runner.campaign.resolve import Named, named_by, resolve
 from fatigue_runner.campaign.spec import Campaign, read_campaign
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.channels import LOADS
@@ -31,33 +32,53 @@ STATUS_FIELDS, MESSAGE_BYTES, COMPRESSED = 7, 56.0, 0.65
 
 @dataclass
 class Plan:
-    """A checked campaign and its cases; notes: what a person should know before the run."""
+    """A campaign and its cases. Until it is `prepared` it tells which of them are finished, and makes no job."""
 
-    resolved: Resolved
+    named: Named
     cases: list[Case]
-    notes: list[str] = field(default_factory=list)
+    prepared: Prepared | None = None
     watched: bool = False  # somebody wants to see cases while they run
 
     @property
     def campaign(self) -> Campaign:
         """What the file says."""
-        return self.resolved.campaign
+        return self.named.campaign
+
+    @property
+    def ready(self) -> Prepared:
+        """What was prepared."""
+        assert self.prepared is not None, "the plan is not prepared"
+        return self.prepared
+
+    @property
+    def notes(self) -> list[str]:
+        """What a person should know before the run."""
+        return self.ready.notes
 
     @cached_property
-    def winds(self) -> dict[str, ResolvedWind]:
-        """The winds by their ids."""
-        return {wind.named.id: wind for wind in self.resolved.winds}
+    def text(self) -> str:
+        """The campaign with every default written out."""
+        return resolved_yaml(self.named)
+
+    @cached_property
+    def asked(self) -> str:
+        """Hash of all that is asked for: nothing is left to do where a folder holds the answer to it."""
+        digest = hashlib.sha256(self.text.encode())
+        digest.update(repr(self.campaign.model_dump()).encode())
+        for case in self.cases:
+            digest.update(f"{case.id} {case.hash}\n".encode())
+        return digest.hexdigest()
 
     @property
     def identity(self) -> dict[str, Any]:
         """What a run folder of this campaign must have in common with it."""
         common = self.campaign.model_dump(include={"name", "duration", "output_rate", "initial", "pitch"})
-        return {"code": code_hash(), "turbine_hash": self.resolved.turbine.hash, **common}
+        return {"code": code_hash(), "turbine_hash": self.named.turbine.hash, **common}
 
     @cached_property
     def columns(self) -> list[Column]:
         """Of the table of results, in their order."""
-        fatigue, states = self.campaign.fatigue, self.resolved.turbine.layout.states
+        fatigue, states = self.campaign.fatigue, self.named.turbine.layout.states
         return table(self.campaign.counted, fatigue.wohler_exponents, states, fatigue.angles)
 
     def log_is_whole(self, case: Case) -> bool:
@@ -69,13 +90,11 @@ class Plan:
     def log_bytes(self) -> float:
         """About what the log of one case takes [bytes]: a number and its tag, the messages' heads, less what compression takes off."""
         campaign = self.campaign
-        layout = self.resolved.turbine.layout
-        signals = max(len(wind.source.channels) for wind in self.resolved.winds)
         topics = {
-            "state": layout.size,
+            "state": self.named.turbine.layout.size,
             "loads": len(LOADS) + len(campaign.loads.channels),
             "status": STATUS_FIELDS,
-            "wind": signals,
+            "wind": self.ready.signals,
         }
         fields = [count for name, count in topics.items() if name in (campaign.log.topics or topics)]
         chosen = len(campaign.log.channels or ()) or sum(fields)
@@ -125,17 +144,17 @@ class Plan:
 
     def setup(self, out: Path, facts: dict[str, str], text: str) -> Setup:
         """What all blocks share; facts: what the run knows of itself, for the logs; text: the resolved campaign."""
-        turbine = self.resolved.turbine
+        turbine = self.named.turbine
         return Setup(
             self.campaign,
-            self.resolved.turbine_source,
+            self.named.turbine_source,
             turbine.hash,
             turbine.layout.states,
             out.resolve() / "logs",
             facts,
-            {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(self.resolved).encode()},
-            self.resolved.walls,
-            self.resolved.sections,
+            {"campaign.yaml": text.encode(), "turbine.yaml": turbine_yaml(self.named).encode()},
+            self.named.walls,
+            self.ready.sections,
         )
 
     def finished(self, store: Store, case: Case) -> bool:
@@ -158,8 +177,8 @@ class Plan:
         for case in cases:
             pending.setdefault(case.wind.id, []).append(case)
         references = {case.wind.id: case for case in self.cases if case.integration.is_reference}
-        layout, sources = self.resolved.turbine.layout, [self.winds[wind].source for wind in pending]
-        keys = [(source.cell_key, layout.wind_size(source.channels)) for source in sources]
+        starts = self.ready.starts
+        keys = [starts[wind].grid for wind in pending]
         jobs = []
         at_risk = int(AT_RISK * len(self.cases) / workers)
         size = min(BLOCK_SIZE, max(BLOCK_SIZE // 2, at_risk))
@@ -168,22 +187,29 @@ class Plan:
             needed = [references[wind] for wind in winds if wind in references]
             own = [case for wind in winds for case in pending[wind]]
             logged = {case.id for case in [*needed, *own] if self.log_is_whole(case) and store.logged(case)}
-            initial = {wind: self.winds[wind].initial for wind in winds}
+            initial = {wind: starts[wind].initial for wind in winds}
             to_log = {case.id for case in own} & self.logged_at_once
             jobs.append(Job(setup, own, needed, initial, logged, to_log))
         return jobs
 
 
+def read_plan(
+    campaign: str | Path | Mapping[str, Any], say: Callable[[str], None] = lambda what: None
+) -> Plan:
+    """Read, validate and expand a campaign file or mapping: its cases, and nothing made. Raises InputError with "file:line"."""
+    say("reading the campaign")
+    named = named_by(*read_campaign(campaign))
+    return Plan(named, make_cases(named))
+
+
 def make_plan(
     campaign: str | Path | Mapping[str, Any], say: Callable[[str], None] = lambda what: None
 ) -> Plan:
-    """Read, validate and expand a campaign file or mapping. Raises InputError with "file:line".
+    """The same, prepared in this process.
 
     say: told what is going on, since the first checks on a machine compile the kernels.
     """
-    say("reading the campaign")
-    spec, source = read_campaign(campaign)
+    plan = read_plan(campaign, say)
     say("loading the kernels (the first run compiles them)")
-    resolved = resolve(spec, source)
-    notes = check(resolved)
-    return Plan(resolved, make_cases(resolved), notes)
+    plan.prepared = prepared(resolve(plan.named))
+    return plan

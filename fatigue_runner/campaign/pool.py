@@ -8,12 +8,14 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
-from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning
 from fatigue_runner.interruption import ENDING
 
 T = TypeVar("T")
@@ -39,6 +41,32 @@ def run_jobs(
             yield beside(lambda job=job: function(job))  # type: ignore[misc]
         return
     yield from _run_in_processes(function, jobs, min(workers, len(jobs)), dask)
+
+
+def elsewhere(function: Callable[[J], T], job: J, workers: int) -> T:
+    """`function(job)` in one of this machine's `workers`, so that what it loads does not stay in this process; what it warns of is told
+    here. Of one worker, which is this process, it is `beside`."""
+    if workers <= 1:
+        return beside(lambda: function(job))
+    try:
+        ((result, said),) = _run_in_processes(_relayed, [(function, job)], workers, None)
+    except KeyboardInterrupt:
+        dismiss_workers()
+        raise
+    for sentence in said:
+        warnings.warn(sentence, FatigueRunnerWarning, stacklevel=2)
+    return result
+
+
+def _relayed(work: tuple[Callable[[J], T], J]) -> tuple[T, list[str]]:
+    """In a worker: what a function returns, and the warnings of this program that it gave."""
+    from fatigue_runner import compiled
+
+    function, job = work
+    with warnings.catch_warnings(record=True) as caught, compiled.telling():
+        warnings.simplefilter("always", FatigueRunnerWarning)
+        result = function(job)
+    return result, [str(one.message) for one in caught if issubclass(one.category, FatigueRunnerWarning)]
 
 
 def _run_in_processes(
@@ -96,6 +124,8 @@ def _born_deaf() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
+    # starting it unblocks SIGINT and SIGTERM (CPython 3.11), and else the first worker would do that
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
     try:
         yield

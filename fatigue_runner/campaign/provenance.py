@@ -15,12 +15,14 @@ from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 
+from fatigue_runner.caches import cache_base
 from fatigue_runner.inputs.files import write_atomically
 
 PACKAGE = "fatigue_runner"
 _MADE_NAME = re.compile(rb"import_module\(f\"\{__package__\}\.(\w+)\.")
 START = f"{PACKAGE}.campaign.block"
 # llvmlite makes the machine code, scipy the splines, matrix exponentials and integrals
+_KEPT = 32  # versions of the program whose hash is remembered
 LIBRARIES = ("numpy", "scipy", "numba", "llvmlite")
 
 
@@ -35,7 +37,10 @@ def code_hash() -> str:
         digest.update(f"{name} {metadata.version(name)}\n".encode())
     found = digest.hexdigest()[:16]
     with suppress(OSError):  # half a second at the start of every run otherwise
+        _memory().parent.mkdir(parents=True, exist_ok=True)
         write_atomically(_memory(), _checked(found))
+        for old in sorted(_memory().parent.iterdir(), key=lambda path: path.stat().st_mtime)[:-_KEPT]:
+            old.unlink()
     return found
 
 
@@ -51,9 +56,8 @@ def program_hash() -> str:
 
 
 def _memory() -> Path:
-    from fatigue_runner import compiled
-
-    return compiled.cache_folder() / f"code-{program_hash()}"
+    # not in the folder of the compiled kernels, whose name only a process with the compiler knows
+    return cache_base() / "code" / program_hash()
 
 
 def _remembered() -> str | None:

@@ -1,9 +1,13 @@
-"""From the words of a campaign file to what they name: turbine, pitch, integrators, winds and starts, each made once."""
+"""From the words of a campaign file to what they name, in two steps.
+
+`named_by` says what there is: turbine, integrators, winds by their names. That is enough to tell the cases and which of them are
+finished, and takes neither the compiler nor any wind. `resolve` makes it: pitch, winds and starts, each once.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,17 +47,24 @@ class ResolvedWind:
 
 
 @dataclass(frozen=True, eq=False)
-class Resolved:
-    """A campaign and everything that it names. `turbine_source` is what a worker gives to `load_turbine`; pitch [rad]."""
+class Named:
+    """A campaign and what it names. `turbine_source` is what a worker gives to `load_turbine`."""
 
     campaign: Campaign
     source: Source
     turbine: Turbine
     turbine_source: str
-    pitch: float | PitchSeries
     integrations: list[Integration]  # the reference first
-    winds: list[ResolvedWind]
+    realisations: list[Realisation]  # the winds, by name
     walls: dict[str, Wall] = field(default_factory=dict)  # of the places whose damage is counted
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Resolved(Named):
+    """A campaign and everything that it names, made; pitch [rad]."""
+
+    pitch: float | PitchSeries
+    winds: list[ResolvedWind]
     sections: SectionLoads | None = None  # what makes the loads of sections, where some are asked for
 
     @property
@@ -78,18 +89,30 @@ class Resolved:
         )
 
 
-def resolve(campaign: Campaign, source: Source) -> Resolved:
-    """Everything that a campaign names. Raises InputError, with the line, for what is not there, cannot be read or cannot be made."""
+def named_by(campaign: Campaign, source: Source) -> Named:
+    """What a campaign names. Raises InputError, with the line, for what is not there or cannot be read, and for too much."""
     turbine_source = _turbine_source(campaign, source)
     turbine = _operated(_load_turbine(turbine_source, source), campaign, source)
-    pitch = _pitch(campaign, turbine, source)
     integrations = _integrations(campaign, source)
     check_steps(campaign, integrations, source)
     check_memory(campaign, source)
-    winds = _winds(campaign, turbine, pitch, len(integrations), source)
-    walls = _walls(campaign, turbine, source)
+    site = Site(turbine.rotor, campaign.duration, Place(source, ("wind",)))
+    winds = realisations(campaign, site, len(integrations), source)
+    return Named(
+        campaign, source, turbine, turbine_source, integrations, winds, _walls(campaign, turbine, source)
+    )
+
+
+def resolve(named: Named) -> Resolved:
+    """Everything that a campaign names, made. Raises InputError, with the line, for what cannot be made."""
+    campaign, turbine, source = named.campaign, named.turbine, named.source
+    _check_loop(turbine, source)
+    pitch = _pitch(campaign, turbine, source)
+    _check_methods(named.integrations, source)
+    winds = _winds(named, pitch)
     sections = _sections(campaign, turbine, source)
-    return Resolved(campaign, source, turbine, turbine_source, pitch, integrations, winds, walls, sections)
+    given = {item.name: getattr(named, item.name) for item in fields(Named)}
+    return Resolved(**given, pitch=pitch, winds=winds, sections=sections)
 
 
 def _sections(campaign: Campaign, turbine: Turbine, source: Source) -> SectionLoads | None:
@@ -127,12 +150,18 @@ def _load_turbine(turbine: str, source: Source) -> Turbine:
 
 
 def _operated(turbine: Turbine, campaign: Campaign, source: Source) -> Turbine:
+    try:
+        return turbine.operated(campaign.operation)
+    except InputError as error:
+        raise InputError(f"{source.where(('operation',))}: {error}") from None
+
+
+def _check_loop(turbine: Turbine, source: Source) -> None:
+    """Refuses a controller that makes the turbine unstable."""
     from fatigue_runner.turbine.loop import check_loop
 
     try:
-        operated = turbine.operated(campaign.operation)
-        check_loop(operated)
-        return operated
+        check_loop(turbine)
     except InputError as error:
         raise InputError(f"{source.where(('operation',))}: {error}") from None
 
@@ -155,8 +184,6 @@ def _pitch(campaign: Campaign, turbine: Turbine, source: Source) -> float | Pitc
 
 def _integrations(campaign: Campaign, source: Source) -> list[Integration]:
     """The reference first, then every integrator at each of its steps; correctors are found and read here."""
-    from fatigue_runner.integrators import method
-
     reference = campaign.reference
     found = [Integration(reference.method, reference.step, True, ("reference",))] if reference else []
     for index, section in enumerate(campaign.integrators):
@@ -165,12 +192,18 @@ def _integrations(campaign: Campaign, source: Source) -> list[Integration]:
         found += [
             Integration(section.method, step, False, path, **corrector) for step, _ in expand(section.step)
         ]
-    for integration in found:
+    return found
+
+
+def _check_methods(integrations: Sequence[Integration], source: Source) -> None:
+    """Refuses methods that nobody knows."""
+    from fatigue_runner.integrators import method
+
+    for integration in integrations:
         try:
             method(integration.method)
         except InputError as error:
             raise InputError(f"{source.where((*integration.path, 'method'))}: {error}") from None
-    return found
 
 
 def _corrector(section: IntegratorSection, source: Source, path: tuple[str | int, ...]) -> dict[str, str]:
@@ -190,22 +223,19 @@ def _corrector(section: IntegratorSection, source: Source, path: tuple[str | int
     return {"corrector": name, "mode": section.mode, "file": str(file), "digest": digest}
 
 
-def _winds(
-    campaign: Campaign, turbine: Turbine, pitch: float | PitchSeries, integrations: int, source: Source
-) -> list[ResolvedWind]:
+def _winds(named: Named, pitch: float | PitchSeries) -> list[ResolvedWind]:
     """Every wind with its start; those of one mean wind share it."""
     from fatigue_runner.turbine.envelope import check_wind
 
-    place = Place(source, ("wind",))
+    campaign, turbine, place = named.campaign, named.turbine, Place(named.source, ("wind",))
     winds, starts, told_of = [], _Starts(campaign, turbine, pitch), cache(partial(check_wind, turbine))
-    site = Site(turbine.rotor, campaign.duration, place)
-    for named in realisations(campaign, site, integrations, source):
-        where = place.where(*named.path)
-        blowing = _blowing(named, turbine.rotor, campaign.duration, where)
+    for wind in named.realisations:
+        where = place.where(*wind.path)
+        blowing = _blowing(wind, turbine.rotor, campaign.duration, where)
         try:
             told = told_of(blowing.mean_speed)
             notes = (*blowing.notes, *([f"{where}: {told}"] if told else []))
-            winds.append(ResolvedWind(named, blowing, starts.of(blowing), notes))
+            winds.append(ResolvedWind(wind, blowing, starts.of(blowing), notes))
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
     return winds

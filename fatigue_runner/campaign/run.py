@@ -7,18 +7,12 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fatigue_runner.campaign.about import (
-    about,
-    operating_curve,
-    resolved_yaml,
-    timed_evaluations,
-    wind_words,
-)
 from fatigue_runner.campaign.block import Job, Setup, run_block, warm_up
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.cluster import Cluster
@@ -26,14 +20,16 @@ from fatigue_runner.campaign.demand import write_logs
 from fatigue_runner.campaign.kept_logs import afterwards
 from fatigue_runner.campaign.parcel import pack
 from fatigue_runner.campaign.pieces import followed
-from fatigue_runner.campaign.plan import Plan, make_plan
-from fatigue_runner.campaign.pool import WorkerEndedError, beside, dismiss_workers, run_jobs
+from fatigue_runner.campaign.plan import Plan, read_plan
+from fatigue_runner.campaign.pool import WorkerEndedError, dismiss_workers, elsewhere, run_jobs
+from fatigue_runner.campaign.prepare import Prepared, prepare
+from fatigue_runner.campaign.resolve import Named
 from fatigue_runner.campaign.store import Store
-from fatigue_runner.campaign.trust import reference_facts
 from fatigue_runner.errors import FatigueRunnerError
+from fatigue_runner.integrators.memory import release
 from fatigue_runner.interruption import Interrupted, end_if_asked, exit_code_of
 from fatigue_runner.results.beyond import beyond
-from fatigue_runner.results.table import Results, read_rows
+from fatigue_runner.results.table import LaterRows, Results, read_rows
 from fatigue_runner.stopwatch import stage
 from fatigue_runner.turbine.rated import rated_rotor_speed
 
@@ -114,88 +110,129 @@ def _run_campaign(
     started = time.perf_counter()
     with Progress(console) as progress:
         with stage("planning"):
-            plan = make_plan(campaign, progress.say)
+            plan = read_plan(campaign, progress.say)
         plan.watched = watch is not None
-        for sentence in [*plan.notes, *plan.words_of_logs]:
-            progress.note(sentence)
         folder = out if out is not None else Path("runs") / plan.campaign.name
         store = Store(folder, plan.identity, fresh, [column.name for column in plan.columns])
-        with nullcontext() if dask is None else Cluster(dask) as cluster:
-            simulated = _simulate(
-                plan, store, workers or plan.campaign.workers, cluster, progress, watch, block
-            )
-        settled = not simulated and store.settled
-        with stage("table"):
-            results = _collect(plan, store, simulated, settled)
-        if plan.campaign.lifetime is not None:
-            from fatigue_runner.results.lifetime import life_of
-
-            results.life = life_of(results.rows, plan.campaign.lifetime)
-        if not settled:
-            _write(results, store, progress)
+        results = None if watch else _settled(plan, store, progress)
+        if results is None:
+            processes = workers or plan.campaign.workers
+            pending = {case.wind.id for case in plan.cases if not plan.finished(store, case)}
+            # where cases run in workers, what is big is not loaded here either
+            helpers = processes if dask is None and len(pending) > 1 else 1
+            with nullcontext() if dask is None else Cluster(dask) as cluster:
+                simulated = _simulate(plan, store, processes, helpers, cluster, progress, watch, block)
+            settled = not simulated and store.settled
+            with stage("table"):
+                results = _collect(plan, store, simulated, settled)
+            if not settled:
+                _write(results, helpers, progress)
+            if not results.report_error:
+                _settle(results, plan, store)
     results.wall_time = time.perf_counter() - started
     return results
 
 
-def _write(results: Results, store: Store, progress: Any) -> None:
-    """Write the tables and the report; that they are there is remembered, so that nobody makes them again."""
+def _settled(plan: Plan, store: Store, progress: Any) -> Results | None:
+    """The results of a folder in which nothing is left to do; None where anything is.
+
+    Neither a kernel nor a wind is made for it, and no record and no row is read: all of that was looked at when the folder was settled,
+    by this program, and checksums tell that it is as it was. Logs are looked at, each to the last bit.
+    """
+    said = store.answer_to(plan.asked)
+    if said is None:
+        return None
+    logged = plan.logged_at_once
+    if not all(plan.finished(store, case) for case in plan.cases if case.id in logged):
+        return None
+    for sentence in [*said["before"], *plan.words_of_logs, *_strangers(plan, store)]:
+        progress.note(sentence)
+    progress.begin(len(plan.cases), len(plan.cases))
+    return _with_life(
+        Results(
+            out=store.out,
+            columns=[column.name for column in plan.columns],
+            meanings=plan.columns,
+            rows=LaterRows(store.out, len(plan.cases)),
+            notes=said["notes"],
+            kept=len(plan.cases),
+            said=said,
+        ),
+        plan,
+    )
+
+
+def _settle(results: Results, plan: Plan, store: Store) -> None:
+    """That the results are there is remembered, so that nobody makes them again, and what they say, if no case is to run again."""
+    failed = any(row["status"] == "failed" for row in results.lost)
+    before = {"asked": plan.asked, "before": plan.notes}
+    store.settle(None if failed else before | results.answer)
+
+
+def _write(results: Results, helpers: int, progress: Any) -> None:
+    """Write the tables and the report."""
     with stage("table"):
-        results.write()
+        results.write_csv()
+        if helpers == 1:
+            results.write_parquet()
     if results.life is not None:
         results.life.write(results.out)
     progress.say("writing the report")
     end_if_asked()
-    try:
-        with stage("report"):
-            _write_report(results)
-    except KeyboardInterrupt:
-        dismiss_workers()
-        raise
-    if not results.report_error:
-        store.settle()
+    with stage("report"):
+        out = results.out
+        results.report_error = (
+            _write_report(out) if helpers == 1 else elsewhere(_write_parquet_and_report, out, helpers)
+        )
 
 
-def _write_report(results: Results) -> None:
-    """Write report.html; what goes wrong there is told, and costs neither the results nor their table."""
+def _write_parquet_and_report(out: Path) -> str:
+    """In a worker: write what is made of `results.csv`."""
+    release()
+    if find_spec("pyarrow"):
+        rows = read_rows(out)
+        Results(out, rows.columns, rows).write_parquet()
+        del rows
+    return _write_report(out)
+
+
+def _write_report(out: Path) -> str:
+    """Write report.html; what goes wrong there is returned, and costs neither the results nor their table."""
     from fatigue_runner.report import write_report
 
     try:
-        write_report(results.out)
+        write_report(out)
     except Exception as error:
-        results.report_error = f"{type(error).__name__}: {error}"
+        return f"{type(error).__name__}: {error}"
+    return ""
 
 
 def _simulate(
     plan: Plan,
     store: Store,
     workers: int,
+    helpers: int,
     cluster: Cluster | None,
     progress: Any,
     watch: Watch | None,
     block: Block,
 ) -> int:
-    """Run the cases that are not finished; returns how many there were."""
-    progress.say("checking the reference")
-    with stage("check of the reference"):
-        facts = about(plan.resolved) | beside(lambda: reference_facts(plan, store.earlier))
-    text = resolved_yaml(plan.resolved)
-    setup = plan.setup(store.out, facts, text)
-    about_run = {
-        "cases": len(plan.cases),
-        "facts": facts,
-        "campaign": plan.campaign.model_dump(),
-        "wind": wind_words(plan.resolved),
-        "operating_curve": operating_curve(plan.resolved),
-    }
-    if plan.campaign.delta_t:
-        progress.say("timing one evaluation of f and of every corrector")
-        about_run["evaluation_times"] = beside(lambda: timed_evaluations(plan.resolved, store.earlier))
-    store.open(about_run, text)
+    """Run the cases that are not finished; returns how many there were.
+
+    helpers: processes that do what is to be done before and after; 1: this one.
+    """
+    progress.say("loading the kernels (the first run compiles them), checking the reference")
+    with stage("preparation"):
+        plan.prepared, said = elsewhere(_prepared, (plan.named, store.earlier), helpers)
+    for sentence in [*plan.notes, *plan.words_of_logs]:
+        progress.note(sentence)
+    setup = plan.setup(store.out, said["facts"], plan.text)
+    store.open(said, plan.text)
     try:
         jobs = plan.jobs(store, setup, workers)
         pending = sum(len(job.cases) for job in jobs)
         progress.begin(len(plan.cases), len(plan.cases) - pending)
-        with _ready(plan, jobs, cluster, block) as run:
+        with _ready(plan, jobs, helpers, cluster, block) as run:
             progress.say("running")
             ids = [[case.id for case in job.cases] for job in jobs]
             for sentence in _before(plan, store, pending):
@@ -280,17 +317,17 @@ def _sample(jobs: Sequence[Job]) -> Job:
 
 @contextmanager
 def _ready(
-    plan: Plan, jobs: Sequence[Job], cluster: Cluster | None, block: Block
+    plan: Plan, jobs: Sequence[Job], helpers: int, cluster: Cluster | None, block: Block
 ) -> Iterator[Callable[[Job], Any]]:
     """What runs a job; its kernels are compiled, where it will run, once."""
     if not jobs:
         yield block
     elif cluster is None:
         with stage("kernels"):
-            beside(lambda: warm_up(_sample(jobs)))
+            elsewhere(warm_up, _sample(jobs), helpers)
         yield block
     else:
-        with cluster.prepared(pack(plan.resolved), _sample(jobs)) as on_worker:
+        with cluster.prepared(pack(plan.named), _sample(jobs)) as on_worker:
             yield on_worker
 
 
@@ -310,14 +347,23 @@ def _before(plan: Plan, store: Store, pending: int) -> list[str]:
         said.append(
             f"{store.damaged} records in {store.out / 'cases.jsonl'} are damaged: these cases run again, or are read from their logs"
         )
+    return [*said, *_strangers(plan, store)]
+
+
+def _strangers(plan: Plan, store: Store) -> list[str]:
+    """Logs that nobody wants any more."""
     strangers = store.strangers(plan.cases)
-    if strangers:
-        freed = sum(path.stat().st_size for path in strangers)
-        said.append(
-            f"{len(strangers)} logs ({freed / 1e6:.3g} MB) in {store.out / 'logs'} are of cases that are no longer in the campaign, "
-            f"{strangers[0].name} for instance; delete them if nobody needs them"
-        )
-    return said
+    if not strangers:
+        return []
+    freed = sum(path.stat().st_size for path in strangers)
+    return [
+        f"{len(strangers)} logs ({freed / 1e6:.3g} MB) in {store.out / 'logs'} are of cases that are no longer in the campaign, "
+        f"{strangers[0].name} for instance; delete them if nobody needs them"
+    ]
+
+
+def _prepared(given: tuple[Named, dict[str, Any]]) -> tuple[Prepared, dict[str, Any]]:
+    return prepare(*given)
 
 
 def _finished(plan: Plan, store: Store) -> str:
@@ -327,12 +373,23 @@ def _finished(plan: Plan, store: Store) -> str:
 
 def _collect(plan: Plan, store: Store, simulated: int, settled: bool) -> Results:
     rows = read_rows(store.out) if settled else store.rows(plan.cases)
-    return Results(
-        out=store.out,
-        columns=[column.name for column in plan.columns],
-        meanings=plan.columns,
-        rows=rows,
-        notes=beyond(rows, rated_rotor_speed(plan.resolved.turbine)),
-        simulated=simulated,
-        kept=len(plan.cases) - simulated,
+    return _with_life(
+        Results(
+            out=store.out,
+            columns=[column.name for column in plan.columns],
+            meanings=plan.columns,
+            rows=rows,
+            notes=beyond(rows, rated_rotor_speed(plan.named.turbine)),
+            simulated=simulated,
+            kept=len(plan.cases) - simulated,
+        ),
+        plan,
     )
+
+
+def _with_life(results: Results, plan: Plan) -> Results:
+    if plan.campaign.lifetime is not None:
+        from fatigue_runner.results.lifetime import life_of
+
+        results.life = life_of(results.rows, plan.campaign.lifetime)
+    return results

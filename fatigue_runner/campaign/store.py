@@ -19,6 +19,7 @@ import threading
 import zlib
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
+from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -36,6 +37,7 @@ _IDENTITY = ("name", "code", "turbine_hash", "duration", "output_rate", "initial
 _RESULTS = ("results.csv", "columns.csv", "results.parquet", "lifetime.csv", "damage.csv", "report.html")
 _OWN = {"campaign.yaml", "run.json", "cases.jsonl", FOLDER, "logs", *_RESULTS}
 MADE = "results"  # entry of run.json: what the results were made of, and what they were then
+ANSWER = "answer"  # entry of run.json: what was asked for, and what the results say of it, where every case is finished
 
 
 class Kept(NamedTuple):
@@ -68,7 +70,11 @@ class Store:
         self._pieces, self._adding = Pieces(out), threading.Lock()
         self._about: dict[str, Any] = {}
         self._seen: tuple[int, int] | None = None  # size and time of the journal that was read
-        self._kept: dict[str, Kept] = {} if fresh else self._read_journal()
+
+    @cached_property
+    def _kept(self) -> dict[str, Kept]:
+        """The last record of every case; read when it is first asked for, since a folder that is settled need not be."""
+        return {} if self._fresh else self._read_journal()
 
     def log_path(self, case_id: str) -> Path:
         """Where the log of a case lies."""
@@ -119,20 +125,39 @@ class Store:
     @property
     def settled(self) -> bool:
         """Whether the results in the folder are those of its records, made by this program: nobody need make them again."""
-        return bool(self.earlier) and self.earlier.get(MADE) == self._made()
+        return bool(self.earlier) and self.earlier.get(MADE) == self._made(self._about)
 
-    def settle(self) -> None:
-        """Remember what the results were made of. The store may be closed already."""
-        write_atomically(self.out / "run.json", _as_json(self._about | {MADE: self._made()}))
+    @property
+    def untouched(self) -> bool:
+        """Whether records and results are to the last bit what this program left; looks at no record."""
+        return bool(self.earlier) and self.earlier.get(MADE) == self._made(self.about_earlier)
 
-    def _made(self) -> dict[str, Any]:
+    @property
+    def about_earlier(self) -> dict[str, Any]:
+        """What the run that goes on said of itself."""
+        return {key: value for key, value in self.earlier.items() if key not in (MADE, ANSWER)}
+
+    def answer_to(self, asked: str) -> dict[str, Any] | None:
+        """What the results said when exactly this (`Plan.asked`) was finished; None where it is not, or the folder has changed since."""
+        answer = self.earlier.get(ANSWER)
+        known = isinstance(answer, dict) and answer.get("asked") == asked and self.untouched
+        return answer if known else None
+
+    def settle(self, answer: dict[str, Any] | None) -> None:
+        """Remember what the results were made of and, where every case is finished, what they say. The store may be closed already."""
+        said = {} if answer is None else {ANSWER: answer}
+        write_atomically(
+            self.out / "run.json", _as_json(self._about | {MADE: self._made(self._about)} | said)
+        )
+
+    def _made(self, about: dict[str, Any]) -> dict[str, Any]:
         """Checksums of what decides the results, and of the results."""
         from fatigue_runner.logbook import checksum
 
         files = [path for name in ("cases.jsonl", *_RESULTS) if (path := self.out / name).exists()]
         return {
             "program": program_hash(),
-            "run.json": zlib.crc32(_as_json(self._about)),
+            "run.json": zlib.crc32(_as_json(about)),
             **{path.name: checksum(path) for path in files},
         }
 
@@ -171,7 +196,7 @@ class Store:
         self._pieces.clear()
         write_atomically(self.out / "campaign.yaml", campaign_text.encode())
         self._about = self.identity | run
-        made = {MADE: self.earlier[MADE]} if MADE in self.earlier else {}
+        made = {key: self.earlier[key] for key in (MADE, ANSWER) if key in self.earlier}
         write_atomically(self.out / "run.json", _as_json(self._about | made))
 
     def add(self, records: Iterable[dict[str, Any]]) -> int:

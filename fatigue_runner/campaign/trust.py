@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fatigue_runner.campaign.evaluate import Evaluated, evaluate
-from fatigue_runner.campaign.plan import Plan
+from fatigue_runner.campaign.resolve import Resolved
 from fatigue_runner.errors import FatigueRunnerError
 
 WINDS = 4
@@ -21,40 +21,40 @@ EVALUATIONS = 4e5  # of one run and case: half a second of one core for a full v
 SENTENCE, NRMSE, DEL_ERROR = "reference_agreement", "reference_nrmse", "reference_del_error"
 
 
-def reference_facts(plan: Plan, earlier: Mapping[str, Any]) -> dict[str, str]:
+def reference_facts(resolved: Resolved, earlier: Mapping[str, Any]) -> dict[str, str]:
     """Facts by name, empty where there is no reference or where it cannot be checked.
 
     earlier: the run.json of a run that goes on; its facts are kept where winds and reference are the same.
     """
-    reference = plan.campaign.reference
+    reference = resolved.campaign.reference
     if reference is None:
         return {}
-    mine = plan.campaign.model_dump()
+    mine = resolved.campaign.model_dump()
     theirs, facts = earlier.get("campaign", {}), earlier.get("facts", {})
     if SENTENCE in facts and all(
         theirs.get(k) == mine[k] for k in ("wind", "reference", "fatigue", "discard")
     ):
         return {name: facts[name] for name in (SENTENCE, NRMSE, DEL_ERROR) if name in facts}
     try:
-        return _measure(plan)
+        return _measure(resolved)
     except FatigueRunnerError:
         return {}  # what is wrong with the reference shows when its cases run
 
 
-def _measure(plan: Plan) -> dict[str, str]:
+def _measure(resolved: Resolved) -> dict[str, str]:
     from fatigue_runner.integrators import method, stability_limit
 
-    reference = plan.campaign.reference
+    reference = resolved.campaign.reference
     assert reference is not None
     name, step = reference.method, reference.step
     other = "rk7" if name == "dop853" else "dop853"
     # twice the step costs half; where that is not stable, half of it
-    second = 2 * step if 2 * step < 0.5 * stability_limit(plan.resolved.turbine, name) else step / 2
+    second = 2 * step if 2 * step < 0.5 * stability_limit(resolved.turbine, name) else step / 2
     smallest, most = min(step, second), max(method(m).evaluations_per_step for m in (name, other))
-    output = 1.0 / plan.campaign.output_rate
+    output = 1.0 / resolved.campaign.output_rate
     length = min(LONGEST, max(EVALUATIONS * smallest / most, 20 * output))
-    outputs = int(min(plan.campaign.discard + length, plan.campaign.duration) / output + 1e-9)
-    block = _Block(plan, outputs * output)
+    outputs = int(min(resolved.campaign.discard + length, resolved.campaign.duration) / output + 1e-9)
+    block = _Block(resolved, outputs * output)
     exact = block.run(name, step)
     nrmse, loads = 0.0, 0.0
     for m, h in ((name, second), (other, step)):
@@ -70,11 +70,11 @@ def _measure(plan: Plan) -> dict[str, str]:
 class _Block:
     """The first winds of the campaign that can share a block, spread over it; `run` evaluates them up to `duration` [s]."""
 
-    def __init__(self, plan: Plan, duration: float) -> None:
-        winds = plan.resolved.winds
+    def __init__(self, resolved: Resolved, duration: float) -> None:
+        winds = resolved.winds
         alike = [wind for wind in winds if wind.source.cell_key == winds[0].source.cell_key]
-        self.ensemble = plan.resolved.ensemble(alike[:: max(1, len(alike) // WINDS)][:WINDS], duration)
-        self.campaign = plan.campaign
+        self.ensemble = resolved.ensemble(alike[:: max(1, len(alike) // WINDS)][:WINDS], duration)
+        self.campaign = resolved.campaign
 
     def run(self, method: str, step: float) -> list[Evaluated]:
         from fatigue_runner.integrators import Integrator, simulate

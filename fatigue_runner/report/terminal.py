@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fatigue_runner.channels import BY_NAME
-from fatigue_runner.results.cells import Row, format_percent
-from fatigue_runner.results.operation import pitch_rate_sentences
+from fatigue_runner.results.cells import format_percent
 from fatigue_runner.results.ranking import (
     LEVELS,
     MethodSummary,
     answer,
     fatigue_columns,
-    rank,
     unseen_winds,
 )
 
@@ -22,19 +20,20 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from fatigue_runner.results.lifetime import Life
+    from fatigue_runner.results.table import Results
 
 
-def print_ranking(rows: Sequence[Row], console: Console) -> None:
+def print_ranking(results: Results, console: Console) -> None:
     """A table of the integrators and the answer in words."""
     from rich.markup import escape
 
-    summaries = rank(rows)
-    console.print(_table(rows, summaries, console))
-    for sentence in [*answer(summaries), *unseen_winds(summaries), *pitch_rate_sentences(rows)]:
+    summaries = results.summaries
+    console.print(_table(results.columns, summaries, console))
+    for sentence in [*answer(summaries), *unseen_winds(summaries), *results.operation]:
         console.print(escape(sentence))
 
 
-def print_life(life: Life, rows: Sequence[Row], console: Console) -> None:
+def print_life(life: Life, summaries: Sequence[MethodSummary], console: Console) -> None:
     """The life in words: how long, which wind, which integrator is good enough, what to distrust."""
     from rich.markup import escape
 
@@ -44,19 +43,19 @@ def print_life(life: Life, rows: Sequence[Row], console: Console) -> None:
     for sentence in [
         *words.places_in_words(life),
         *words.loads_in_words(life),
-        *words.integrator_in_words(life, rank(rows)),
+        *words.integrator_in_words(life, summaries),
     ]:
         console.print(escape(sentence))
     for sentence in [*life.statement(), *words.distrust(life)]:
         console.print(f"[dim]{escape(sentence)}[/]")
 
 
-def _table(rows: Sequence[Row], summaries: Sequence[MethodSummary], console: Console) -> Table:
+def _table(columns: Sequence[str], summaries: Sequence[MethodSummary], console: Console) -> Table:
     """Integrators, cheapest first; a narrow terminal gets one column for the worst of all channels."""
     from rich import box
     from rich.table import Table
 
-    fatigue = fatigue_columns(rows)
+    fatigue = fatigue_columns([dict.fromkeys(columns)])
     channels = list(dict.fromkeys(channel for channel, _, _ in fatigue))
     labels = {channel: BY_NAME[channel].label.removesuffix(" moment") for channel in channels}
     groups = {label.replace("blade ", "blade\u00a0"): [channel] for channel, label in labels.items()}

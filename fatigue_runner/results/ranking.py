@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from statistics import median
+from typing import Any
 
 from fatigue_runner.channels import BY_NAME, placed
 from fatigue_runner.naming import integrator_label
@@ -164,6 +165,33 @@ def _summarise(
         channel_errors=worst,
         unseen=unseen(rows),
     )
+
+
+def as_data(summaries: Iterable[MethodSummary]) -> list[dict[str, Any]]:
+    """The summaries as JSON holds them."""
+    return [asdict(summary) for summary in summaries]
+
+
+def from_data(data: Iterable[Mapping[str, Any]]) -> list[MethodSummary]:
+    """The summaries that were `as_data`."""
+
+    def error(found: Mapping[str, Any] | None) -> DelError | None:
+        return None if found is None else DelError(**found)
+
+    def winds(found: Mapping[str, Any] | None) -> Unseen | None:
+        return None if found is None else Unseen(**{**found, "trained": tuple(found["trained"])})
+
+    return [
+        MethodSummary(
+            **{
+                **item,
+                "worst_del_error": error(item["worst_del_error"]),
+                "channel_errors": tuple(DelError(**found) for found in item["channel_errors"]),
+                "unseen": winds(item["unseen"]),
+            }
+        )
+        for item in data
+    ]
 
 
 def unseen_winds(summaries: Iterable[MethodSummary]) -> list[str]:

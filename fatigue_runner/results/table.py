@@ -9,8 +9,9 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from fatigue_runner.channels import channel_name
 from fatigue_runner.encoded import decoded
@@ -18,6 +19,8 @@ from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.results.columns import NEEDED, Column, kind_of, units_csv
 from fatigue_runner.results.frames import to_arrow, to_pandas
+from fatigue_runner.results.operation import pitch_rate_sentences
+from fatigue_runner.results.ranking import MethodSummary, as_data, from_data, rank
 from fatigue_runner.results.records import from_line, lines_of
 from fatigue_runner.results.rows import Rows
 
@@ -32,6 +35,32 @@ def known(value: Any) -> Any:
     """A cell's value as plain Python; None for what is unknown: NaN and infinity are no figures."""
     value = value.item() if hasattr(value, "item") else value
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+class LaterRows(Sequence[Mapping[str, Any]]):
+    """So many rows of a run folder's table, which is read when one of them is first looked at."""
+
+    def __init__(self, folder: Path, count: int) -> None:
+        self._folder, self._count = folder, count
+
+    @cached_property
+    def _rows(self) -> Rows:
+        return read_rows(self._folder)
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, at: int) -> Mapping[str, Any]: ...
+    @overload
+    def __getitem__(self, at: slice) -> list[Mapping[str, Any]]: ...
+    def __getitem__(self, at: int | slice) -> Mapping[str, Any] | list[Mapping[str, Any]]:
+        return self._rows[at]  # type: ignore[return-value]
+
+    def __eq__(self, other: object) -> bool:
+        return self._rows == (other._rows if isinstance(other, LaterRows) else other)
+
+    __hash__ = None  # type: ignore[assignment]  # as of a list
 
 
 @dataclass
@@ -52,6 +81,7 @@ class Results:
     life: Life | None = None
     notes: list[str] = field(default_factory=list)  # what limits the figures, in sentences
     meanings: Sequence[Column] = ()  # of the columns, where they are known
+    said: Mapping[str, Any] | None = None  # `answer` of an earlier run, where nothing has changed since
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -74,7 +104,29 @@ class Results:
     @property
     def lost(self) -> list[Mapping[str, Any]]:
         """The rows of the cases that diverged or failed."""
+        if self.said is not None and not self.said["lost"]:
+            return []
         return [row for row in self.rows if row["status"] != "done"]
+
+    @cached_property
+    def summaries(self) -> list[MethodSummary]:
+        """What each integrator costs and how good it is, cheapest first."""
+        return rank(self.rows) if self.said is None else from_data(self.said["summaries"])
+
+    @cached_property
+    def operation(self) -> list[str]:
+        """What a person should know of the controller, in sentences."""
+        return pitch_rate_sentences(self.rows) if self.said is None else list(self.said["operation"])
+
+    @property
+    def answer(self) -> dict[str, Any]:
+        """What the rows say, as JSON holds it: who has it need not read them for the answer in the terminal."""
+        return {
+            "notes": self.notes,
+            "summaries": as_data(self.summaries),
+            "operation": self.operation,
+            "lost": len(self.lost),
+        }
 
     @property
     def exit_code(self) -> int:
@@ -83,11 +135,15 @@ class Results:
 
     def write(self) -> None:
         """Write `results.csv` with `columns.csv`, which says what its columns are, and `results.parquet` where pyarrow is installed."""
+        self.write_csv()
+        self.write_parquet()
+
+    def write_csv(self) -> None:
+        """Write `results.csv` with `columns.csv`."""
         rows = self.rows if isinstance(self.rows, Rows) else Rows(self.columns, self.rows)
         write_atomically(self.out / "results.csv", _csv(rows))
         if self.meanings:
             write_atomically(self.out / "columns.csv", units_csv(self.meanings).encode())
-        self._write_parquet()
 
     def to_pandas(self) -> Any:
         """The table as a pandas DataFrame, where pandas is installed."""
@@ -97,7 +153,8 @@ class Results:
         """The table as a pyarrow Table, where pyarrow is installed."""
         return to_arrow(self.rows, {name: kind_of(name) for name in self.columns})
 
-    def _write_parquet(self) -> None:
+    def write_parquet(self) -> None:
+        """Write `results.parquet` where pyarrow is installed."""
         try:
             import pyarrow.parquet as pq
         except ImportError:

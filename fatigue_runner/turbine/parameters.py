@@ -1,4 +1,4 @@
-"""From a turbine file to the scalars that the equations of motion take (`equations.PARAMETERS`)."""
+"""From a turbine file to the scalars that the equations of motion take (`parameter_names.PARAMETERS`)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from fatigue_runner import shipped
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.turbine.beam import INTEGRAND_NAMES, BladeModes, TowerModes, blade_modes, tower_modes
+from fatigue_runner.turbine.parameter_names import PARAMETERS
 
 DATA = shipped.turbines()
 
@@ -35,7 +36,7 @@ _FAR = 1e9  # a torque that is never reached [N m]
 
 
 def equation_parameters(data: Mapping[str, Any]) -> dict[str, float]:
-    """`equations.PARAMETERS` at zero pitch from a turbine file's mapping.
+    """`parameter_names.PARAMETERS` at zero pitch from a turbine file's mapping.
 
     Raises InputError naming the missing or impossible entry.
     """
@@ -67,8 +68,6 @@ def equation_parameters(data: Mapping[str, Any]) -> dict[str, float]:
 
 def checked(values: Mapping[str, float]) -> dict[str, float]:
     """The parameters, complete and finite; raises InputError for a missing, unknown or non-finite one."""
-    from fatigue_runner.turbine.generated.kernel import PARAMETERS
-
     values = {**DEFAULTS, **values}
     for name in values:
         if name not in PARAMETERS:
@@ -83,7 +82,7 @@ def checked(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def blade_integrals(integrals: Any) -> dict[str, float]:
-    """`equations.BLADE_INTEGRALS` of a blade, or of the part of it that `BladeModes.beyond` gives."""
+    """`parameter_names.BLADE_INTEGRALS` of a blade, or of the part of it that `BladeModes.beyond` gives."""
     place = {name: i for i, name in enumerate(INTEGRAND_NAMES)}
     return {name: float(integrals[place[a], place[b]]) for name, (a, b) in _INTEGRALS.items()}
 

@@ -23,7 +23,7 @@ DESIGNED_AT = 15  # operating points above rated
 
 @dataclass(frozen=True, eq=False)
 class RigidRotor:
-    """parameters: `equations.PARAMETERS`, at zero pitch."""
+    """parameters: `parameter_names.PARAMETERS`, at zero pitch."""
 
     parameters: Mapping[str, float]
     tables: AeroTables

@@ -39,7 +39,7 @@ BEYOND_FINE = 0.1  # rad: a pitch at which the torque is that of region 3
 
 @dataclass(frozen=True, eq=False)
 class Turbine:
-    """One turbine. `parameters` by `equations.PARAMETERS` [SI], at zero pitch.
+    """One turbine. `parameters` by `parameter_names.PARAMETERS` [SI], at zero pitch.
 
     family: `t2b1i1cg` (the blades share one edge mode) or `t2b2cg` (each has its own);
     control: the turbine file's section, None where it has none; operation: who steers, see `OPERATIONS`; dynamics: what moves it;
@@ -467,7 +467,7 @@ def _pitched_cells(tables: AeroTables, names: tuple[str, ...]) -> Array:
 def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
     """A turbine by shipped name (`nrel5mw`, `t2b1i1cg`), by the path of a turbine YAML, or from a mapping.
 
-    A mapping is either a turbine file's content, or a full parameter set: `parameters` (equations.PARAMETERS) and `tables`
+    A mapping is either a turbine file's content, or a full parameter set: `parameters` (parameter_names.PARAMETERS) and `tables`
     (tip_speed_ratio, pitch_deg, coefficients), with `interpolation: cubic | bilinear`.
     Raises InputError naming what is missing or wrong.
     """

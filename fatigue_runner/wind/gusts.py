@@ -208,8 +208,6 @@ class ExtremeShear(Gust):
         return np.stack([change, none] if self.across == "vertical" else [none, change], axis=1)
 
 
-GUSTS = {gust.code: gust for gust in (OperatingGust, DirectionChange, CoherentGust, ExtremeShear)}
-
 # The transients by the names that design load cases have them under, V for vertical and H for horizontal shear
 EVENTS: dict[str, Gust] = {
     "EOG": OperatingGust(),

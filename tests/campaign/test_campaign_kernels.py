@@ -121,13 +121,13 @@ def test_a_shipped_campaign_is_valid_and_its_resolved_form_means_the_same(path, 
     plan = make_plan(path)
     assert path.stem == plan.campaign.name.replace("-", "_")
     copy = tmp_path / "resolved.yaml"
-    copy.write_text(resolved_yaml(plan.resolved))
+    copy.write_text(resolved_yaml(plan.named))
     assert [case.hash for case in make_plan(copy).cases] == [case.hash for case in plan.cases]
 
 
 def test_the_quickstart_shows_a_turbulent_life():
     plan = make_plan(CAMPAIGNS / "quickstart.yaml")
-    assert {wind.source.mean_speed for wind in plan.resolved.winds} == {4, 8, 12, 16, 20, 24}
+    assert {wind.mean_speed for wind in plan.named.realisations} == {4, 8, 12, 16, 20, 24}
     assert {case.integration.method for case in plan.cases} == {"heun", "rk3", "rk4", "dop853"}
     assert (plan.campaign.operation, plan.campaign.turbine) == ("controlled", "nrel5mw")
     assert plan.campaign.lifetime is not None and plan.campaign.wind.type == "turbulent"
@@ -135,8 +135,8 @@ def test_the_quickstart_shows_a_turbulent_life():
 
 def test_dlc_1_2_is_that_of_the_standard():
     plan = make_plan(CAMPAIGNS / "dlc12.yaml")
-    assert sorted({wind.source.mean_speed for wind in plan.resolved.winds}) == list(range(4, 25, 2))
-    assert len(plan.resolved.winds) == 66 and all(wind.source.harmonics == 6 for wind in plan.resolved.winds)
+    assert sorted({wind.mean_speed for wind in plan.named.realisations}) == list(range(4, 25, 2))
+    assert len(plan.named.realisations) == 66 and plan.ready.signals == 3 + 2 * 6
     assert (plan.campaign.duration, plan.campaign.discard, plan.campaign.operation) == (
         720,
         120,

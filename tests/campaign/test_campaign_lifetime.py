@@ -83,7 +83,7 @@ def test_the_names_of_weis_are_understood(world, tmp_path):
     path.write_text(text.replace("wind:\n  speeds: [6, 8, 10]\n", wind))
     plan = make_plan(path)
     assert (plan.campaign.duration, plan.campaign.discard) == (10.0, 2.0)
-    assert len(plan.resolved.winds) == 6
+    assert len(plan.named.realisations) == 6
 
 
 REFUSED = [

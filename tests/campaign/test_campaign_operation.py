@@ -8,6 +8,7 @@ import pytest
 from fatigue_runner import run_campaign, simulate
 from fatigue_runner.campaign.evaluate import discarded
 from fatigue_runner.campaign.plan import make_plan
+from fatigue_runner.campaign.resolve import resolve
 from fatigue_runner.errors import InputError
 from fatigue_runner.logbook import read_log
 from fatigue_runner.wind import ConstantWind
@@ -108,7 +109,7 @@ def test_what_is_discarded_is_discarded_of_every_series(nrel5mw):
 
 @pytest.mark.parametrize("initial", ["paper-spinning", [0.0] * 6 + [1.0, 97.0] + [0.0] * 6 + [1.2, 116.4]])
 def test_a_controller_begins_as_if_a_given_start_had_been_so_for_long(initial):
-    wind = make_plan({**CAMPAIGN, "initial": initial}).resolved.winds[0]
+    wind = resolve(make_plan({**CAMPAIGN, "initial": initial}).named).winds[0]
     assert wind.initial.shape == (18,)
     assert wind.initial[15] > 0 and wind.initial[16] == wind.initial[15] and wind.initial[17] == 0
     if not isinstance(initial, str):

@@ -487,8 +487,8 @@ def test_what_the_turbine_cannot_do_is_refused_and_nothing_is_written(
 @pytest.mark.parametrize("name", ["mine.yaml", "mine.YAML", "mine.yml", "./mine"])
 def test_a_turbine_file_is_looked_for_beside_the_campaign(world, tmp_path, name):
     plan = make_plan(write_campaign(tmp_path, turbine=name))
-    assert plan.resolved.turbine_source == str(tmp_path / name)
-    assert make_plan(write_campaign(tmp_path, turbine="mine")).resolved.turbine_source == "mine"
+    assert plan.named.turbine_source == str(tmp_path / name)
+    assert make_plan(write_campaign(tmp_path, turbine="mine")).named.turbine_source == "mine"
 
 
 def test_winds_from_files_run_and_are_named_after_them(world, tmp_path, out):

@@ -8,7 +8,8 @@ import pytest
 
 from fatigue_runner import run_campaign
 from fatigue_runner.campaign import trust
-from fatigue_runner.campaign.plan import make_plan
+from fatigue_runner.campaign.resolve import named_by, resolve
+from fatigue_runner.campaign.spec import read_campaign
 from fatigue_runner.logbook import read_log
 
 CAMPAIGN = {
@@ -26,6 +27,10 @@ CAMPAIGN = {
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     return run_campaign(CAMPAIGN, tmp_path_factory.mktemp("trust") / "run")
+
+
+def resolved(campaign):
+    return resolve(named_by(*read_campaign(campaign)))
 
 
 def test_a_fine_reference_agrees_with_another_method_and_another_step(results):
@@ -51,21 +56,21 @@ def test_a_coarse_reference_is_a_limit_of_the_result(tmp_path):
 
 def test_the_bound_is_above_the_references_own_error():
     """Against RK7 at a tenth of the step, on the same winds."""
-    facts = trust.reference_facts(make_plan({**CAMPAIGN, "reference": {"method": "rk4", "step": 0.02}}), {})
-    block = trust._Block(make_plan(CAMPAIGN), 6.0)
+    facts = trust.reference_facts(resolved({**CAMPAIGN, "reference": {"method": "rk4", "step": 0.02}}), {})
+    block = trust._Block(resolved(CAMPAIGN), 6.0)
     pairs = zip(block.run("rk4", 0.02), block.run("rk7", 0.002), strict=True)
     own = max(trust._distance(a, b)[0] for a, b in pairs)
     assert own < float(facts["reference_nrmse"]) < 100 * own
 
 
 def test_a_run_that_goes_on_keeps_what_is_known(monkeypatch):
-    plan = make_plan(CAMPAIGN)
-    monkeypatch.setattr(trust, "_measure", lambda plan: {"reference_agreement": "measured anew"})
-    earlier = {"campaign": plan.campaign.model_dump(), "facts": {"reference_agreement": "known"}}
-    assert trust.reference_facts(plan, earlier) == {"reference_agreement": "known"}
-    other = make_plan({**CAMPAIGN, "reference": {"method": "rk7", "step": 0.005}})
+    known = resolved(CAMPAIGN)
+    monkeypatch.setattr(trust, "_measure", lambda resolved: {"reference_agreement": "measured anew"})
+    earlier = {"campaign": known.campaign.model_dump(), "facts": {"reference_agreement": "known"}}
+    assert trust.reference_facts(known, earlier) == {"reference_agreement": "known"}
+    other = resolved({**CAMPAIGN, "reference": {"method": "rk7", "step": 0.005}})
     assert trust.reference_facts(other, earlier) == {"reference_agreement": "measured anew"}
 
 
 def test_without_a_reference_there_is_nothing_to_say():
-    assert trust.reference_facts(make_plan({**CAMPAIGN, "reference": None}), {}) == {}
+    assert trust.reference_facts(resolved({**CAMPAIGN, "reference": None}), {}) == {}

@@ -67,7 +67,7 @@ def test_a_job_runs_where_nothing_of_its_folder_is_seen(tmp_path):
     campaign = write(tmp_path / "project")
     here_it_ran = run_campaign(campaign, tmp_path / "out", workers=1)
     plan = make_plan(campaign)
-    resolved = plan.resolved
+    resolved = plan.named
     setup = Setup(
         plan.campaign, resolved.turbine_source, resolved.turbine.hash, resolved.turbine.layout.states, tmp_path / "logs"
     )  # fmt: skip
@@ -93,7 +93,7 @@ def test_a_job_runs_where_nothing_of_its_folder_is_seen(tmp_path):
 
 def test_the_sample_has_every_kind_once(tmp_path):
     plan = make_plan(write(tmp_path / "project", winds=5))
-    resolved = plan.resolved
+    resolved = plan.named
     setup = Setup(
         plan.campaign, resolved.turbine_source, resolved.turbine.hash, resolved.turbine.layout.states, tmp_path / "logs"
     )  # fmt: skip

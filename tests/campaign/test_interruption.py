@@ -408,8 +408,8 @@ def test_a_block_takes_the_memory_that_is_planned_for_it(tmp_path, winds):
     setup = Setup(
         plan.campaign,
         "nrel5mw",
-        plan.resolved.turbine.hash,
-        plan.resolved.turbine.layout.states,
+        plan.named.turbine.hash,
+        plan.named.turbine.layout.states,
         tmp_path / "run" / "logs",
     )
     store.open({}, "")

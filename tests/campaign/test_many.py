@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import gc
+import json
 import random
+import subprocess
+import sys
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from fatigue_runner.campaign import run, run_campaign, store
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.channels import FATIGUE_CHANNELS
+from fatigue_runner.interruption import ENDING
 from fatigue_runner.report.page import render
 from fatigue_runner.report.rundata import Run
-from fatigue_runner.results import read_results
-from fatigue_runner.results.columns import table
+from fatigue_runner.results import read_results, table
+from fatigue_runner.results.columns import table as columns_of
 from fatigue_runner.results.ranking import fatigue_columns
 from fatigue_runner.results.records import from_line, head_of, to_line
 from fatigue_runner.results.rows import Rows
 from fatigue_runner.results.table import Results, read_rows
 
-COLUMNS = table(FATIGUE_CHANNELS, [3.0, 4.0, 5.0, 10.0, 12.0])
+COLUMNS = columns_of(FATIGUE_CHANNELS, [3.0, 4.0, 5.0, 10.0, 12.0])
 NAMES = [column.name for column in COLUMNS]
 MANY = 2000
 
@@ -143,17 +148,28 @@ def settled(tmp_path_factory):
 
 @pytest.fixture
 def counted(monkeypatch):
-    """What is made: records that are read whole, reports that are written."""
-    found = {"records": 0, "reports": 0}
+    """What is made and read: plans prepared, records read whole, heads of records and tables read, reports written."""
+    found = dict.fromkeys(("prepared", "heads", "tables", "records", "reports"), 0)
 
     def read(line):
         found["records"] += 1
         return from_line(line)
 
-    def write(results, write=run._write_report):
-        found["reports"] += 1
-        write(results)
+    def counting(what, function):
+        def called(*arguments):
+            found[what] += 1
+            return function(*arguments)
 
+        return called
+
+    def write(out, write=run._write_report):
+        found["reports"] += 1
+        return write(out)
+
+    monkeypatch.setattr(run, "prepare", counting("prepared", run.prepare))
+    monkeypatch.setattr(store, "head_of", counting("heads", store.head_of))
+    monkeypatch.setattr(run, "read_rows", counting("tables", run.read_rows))
+    monkeypatch.setattr(table, "read_rows", counting("tables", table.read_rows))
     monkeypatch.setattr(store, "from_line", read)
     monkeypatch.setattr(run, "_write_report", write)
     return found
@@ -165,13 +181,17 @@ def test_a_run_with_nothing_to_do_makes_nothing_again(settled, counted):
         file.name: (file.stat().st_mtime_ns, file.read_bytes()) for file in out.iterdir() if file.is_file()
     }
     again = run_campaign(path, out, workers=1)
-    assert counted == {"records": 0, "reports": 0}
-    assert again.rows == first.rows and again.columns == first.columns and again.kept == len(first)
+    assert again.exit_code == 0 and len(again) == len(first)
+    assert (
+        again.summaries == first.summaries and again.notes == first.notes and again.columns == first.columns
+    )
+    assert set(counted.values()) == {0}, "the answer of the first run, without a look at any case"
+    assert again.rows == first.rows and again.kept == len(first)
+    assert counted == dict.fromkeys(counted, 0) | {"tables": 1}, "rows are read when they are looked at"
     after = {
         file.name: (file.stat().st_mtime_ns, file.read_bytes()) for file in out.iterdir() if file.is_file()
     }
-    assert {name for name in before if after[name] != before[name]} <= {"run.json", "campaign.yaml"}
-    assert after["run.json"][1] == before["run.json"][1]
+    assert after == before
 
 
 @pytest.mark.parametrize("name", ["report.html", "results.csv", "columns.csv"])
@@ -183,7 +203,7 @@ def test_results_that_are_not_as_they_were_are_made_again(settled, counted, name
     if how == "changed":
         (out / name).write_bytes(whole.replace(b"done", b"gone") + b" ")
     assert run_campaign(path, out, workers=1).rows == first.rows
-    assert counted == {"records": len(first), "reports": 1}
+    assert (counted["records"], counted["reports"], counted["prepared"]) == (len(first), 1, 1)
     if name != "report.html":  # which says when
         assert (out / name).read_bytes() == whole
 
@@ -195,6 +215,70 @@ def test_another_program_makes_the_report_again(settled, counted, monkeypatch):
     assert counted["reports"] == 1
     run_campaign(path, out, workers=1)
     assert counted["reports"] == 1
+
+
+@pytest.mark.parametrize("key", ["run.json", "answer", "record"])
+def test_what_is_not_as_it_was_is_looked_at_again(settled, counted, key):
+    path, out, first = settled
+    told = json.loads((out / "run.json").read_text())
+    if key == "run.json":
+        told["facts"]["machine"] = "another"
+    elif key == "answer":
+        told["answer"]["asked"] = "something else"
+    else:
+        with (out / "cases.jsonl").open("ab") as journal:
+            journal.write(b"half a rec")
+    (out / "run.json").write_text(json.dumps(told, indent=1))
+    again = run_campaign(path, out, workers=1)
+    assert counted["prepared"] == 1 and counted["heads"] > 0
+    assert again.rows == first.rows and again.simulated == 0
+    assert run_campaign(path, out, workers=1).said is not None, "and settled again"
+
+
+def test_another_question_is_another_answer(settled, counted, tmp_path):
+    path, out, first = settled
+    other = tmp_path / path.name
+    other.write_text(CAMPAIGN.replace("[6, 8]", "[6]"))
+    assert len(run_campaign(other, out, workers=1)) == 2
+    assert counted["prepared"] == 1 and counted["reports"] == 1
+    assert run_campaign(path, out, workers=1).rows == first.rows
+    assert counted["prepared"] == 2
+
+
+HEAVY = {"numba", "llvmlite", "scipy", "pyarrow", "matplotlib", "jinja2"}
+APART = """
+import json, re, signal, sys
+from functools import partial
+from fatigue_runner import run_campaign
+from fatigue_runner.campaign.pool import elsewhere
+
+if __name__ == "__main__":  # workers import this file
+    results = run_campaign(sys.argv[1], sys.argv[2], workers=2)
+    peak = int(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1]) / 1e3
+    deaf = elsewhere(partial(signal.pthread_sigmask, signal.SIG_BLOCK), [], 2) if results.simulated else []
+    print(json.dumps([sorted(deaf), results.simulated, len(results), peak, sorted({name.split(".")[0] for name in sys.modules})]))
+"""
+
+
+@pytest.mark.skipif(
+    not Path("/proc/self/status").exists(), reason="the system does not tell a process's peak memory"
+)
+def test_with_workers_the_run_s_own_process_loads_neither_compiler_nor_report(tmp_path):
+    """Peak memory [MB] of a process that plans, runs and reports: 70 here, and 1 to 3 kB a case (above); 314 before."""
+    (tmp_path / "c.yaml").write_text(CAMPAIGN)
+    (tmp_path / "apart.py").write_text(APART)
+    command = [sys.executable, "apart.py", "c.yaml", "out"]
+    for simulated in (4, 0):
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        deaf, ran, cases, peak, modules = json.loads(done.stdout.splitlines()[-1])
+        assert (ran, cases) == (simulated, 4)
+        assert not ran or set(deaf) >= set(ENDING), (
+            "Ctrl-C while workers start is the run's own process's alone"
+        )
+        assert not HEAVY & set(modules)
+        assert peak < 120
+    assert (tmp_path / "out" / "report.html").is_file() and (tmp_path / "out" / "results.csv").is_file()
 
 
 def test_a_case_that_changes_its_record_has_the_new_one(tmp_path):

@@ -26,7 +26,7 @@ from fatigue_runner.campaign.run import run_campaign
 # of a worker; the rest of its time is bookkeeping
 STAGES = ("wind", "integration", "loads", "counting", "statistics", "comparison", "logging")
 REST = "bookkeeping"
-FIXED = ("planning", "check of the reference", "kernels", "table", "report")
+FIXED = ("planning", "preparation", "kernels", "table", "report")
 OPENFAST = (
     8.0  # times real time that a core makes of the same turbine with the same degrees of freedom (measured)
 )

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from fatigue_runner.campaign.resolve import resolve
+from fatigue_runner.campaign.resolve import named_by, resolve
 from fatigue_runner.campaign.spec import campaign_source, parse_campaign
 from fatigue_runner.errors import InputError, did_you_mean
 from fatigue_runner.inputs.section import Section, problem, validated
@@ -177,7 +177,7 @@ def _cases(source: Source) -> Cases:
         raise InputError(
             f"{source.where(('pitch',))}: a benchmark needs one pitch: its exponential methods and its correctors are made for one"
         )
-    resolved = resolve(spec, source)
+    resolved = resolve(named_by(spec, source))
     reference, *others = [integration.build() for integration in resolved.integrations]
     return Cases(
         spec.name, resolved.ensemble(), spec.discard, list(spec.fatigue.channels), list(spec.fatigue.wohler_exponents),

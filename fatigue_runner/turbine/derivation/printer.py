@@ -18,6 +18,7 @@ from fatigue_runner.layout import FAMILIES, T2B1I1CG, Layout
 from fatigue_runner.layout import PITCH as PITCH_SIGNAL
 from fatigue_runner.turbine.derivation import equations as eq
 from fatigue_runner.turbine.derivation.pitching import PITCH, with_varying_pitch
+from fatigue_runner.turbine.parameter_names import PARAMETERS
 
 Lines = list[tuple[sp.Symbol, sp.Expr]]
 
@@ -44,7 +45,7 @@ class Variant:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Of the equations, then of the controller."""
-        return (*eq.PARAMETERS, *(self.controller.parameters if self.controller else ()))
+        return (*PARAMETERS, *(self.controller.parameters if self.controller else ()))
 
     def control_lines(self) -> Lines:
         """What the controller commands, as the first lines of a sheet; none without one."""

@@ -23,7 +23,7 @@ def sections_module() -> str:
 
 
 def _function(name: str, doc: str, sheet: eq.Sheet, outputs: dict[str, sp.Expr]) -> str:
-    """A function (p, x): parameters by `equations.PARAMETERS` and arrays by the names of symbols -> {output: array}."""
+    """A function (p, x): parameters by `parameter_names.PARAMETERS` and arrays by the names of symbols -> {output: array}."""
     wanted: set[sp.Symbol] = set().union(*(sp.sympify(e).free_symbols for e in outputs.values()))
     lines = schedule(used_only(sheet.lines, wanted), "u")
     used = set().union(wanted, *(e.free_symbols for _, e in lines))
