@@ -21,6 +21,8 @@ from fatigue_runner.interruption import ENDING
 T = TypeVar("T")
 J = TypeVar("J")
 
+_told: set[str] = set()  # what workers have warned of
+
 WATCH = 0.5  # s between two looks of a worker for its parent
 
 
@@ -54,7 +56,9 @@ def elsewhere(function: Callable[[J], T], job: J, workers: int) -> T:
         dismiss_workers()
         raise
     for sentence in said:
-        warnings.warn(sentence, FatigueRunnerWarning, stacklevel=2)
+        if sentence not in _told:  # by another worker
+            _told.add(sentence)
+            warnings.warn(sentence, FatigueRunnerWarning, stacklevel=2)
     return result
 
 

@@ -8,14 +8,16 @@ import random
 import subprocess
 import sys
 import tracemalloc
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from fatigue_runner.campaign import run, run_campaign, store
+from fatigue_runner.campaign import pool, run, run_campaign, store
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.channels import FATIGUE_CHANNELS
+from fatigue_runner.errors import FatigueRunnerWarning
 from fatigue_runner.interruption import ENDING
 from fatigue_runner.report.page import render
 from fatigue_runner.report.rundata import Run
@@ -279,6 +281,25 @@ def test_with_workers_the_run_s_own_process_loads_neither_compiler_nor_report(tm
         assert not HEAVY & set(modules)
         assert peak < 120
     assert (tmp_path / "out" / "report.html").is_file() and (tmp_path / "out" / "results.csv").is_file()
+
+
+def test_what_workers_warn_of_is_told_once(monkeypatch):
+    monkeypatch.setattr(
+        pool, "_run_in_processes", lambda function, jobs, workers, dask: iter([function(*jobs)])
+    )
+    monkeypatch.setattr(pool, "_told", set())
+
+    def warns(sentence):
+        warnings.warn(sentence, FatigueRunnerWarning, stacklevel=1)
+        return sentence
+
+    with pytest.warns(FatigueRunnerWarning) as told:
+        assert [pool.elsewhere(warns, word, 2) for word in ("slow", "slow", "full")] == [
+            "slow",
+            "slow",
+            "full",
+        ]
+    assert [str(one.message) for one in told] == ["slow", "full"]
 
 
 def test_a_case_that_changes_its_record_has_the_new_one(tmp_path):
