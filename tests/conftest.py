@@ -1,13 +1,16 @@
-"""How the tests run: the whole suite on a few processes, part of it in one; the kernels are compiled once before."""
+"""How the tests run: the whole suite on a few processes, with its kernels compiled before and its memory bounded; part of it in one."""
 
 from __future__ import annotations
 
+import hashlib
 import os
-import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import kernels
+import memory
 import pytest
 
 if TYPE_CHECKING:
@@ -19,6 +22,8 @@ for _library in ("OPENBLAS", "MKL", "OMP"):
 
 # More do not pay: every process loads the kernels anew, and campaigns under test start workers of their own.
 MOST_PROCESSES = 4
+
+MEMORY = pytest.StashKey[memory.Watch]()
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
@@ -32,21 +37,60 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile what is not in the cache, before several processes do so at the same time."""
-    if getattr(session.config.option, "numprocesses", None):
+    """Before several processes run the whole suite: compile what is not in the cache, and look at the memory of all from then on."""
+    whole = session.config.args_source is session.config.ArgsSource.TESTPATHS
+    if whole and getattr(session.config.option, "numprocesses", None):
+        session.config.stash[MEMORY] = memory.Watch()
         compile_kernels(session.config.get_terminal_writer().line)
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """A run that takes too much memory has failed."""
+    watch = session.config.stash.get(MEMORY, None)
+    if (
+        watch is not None
+        and watch.stop() > _bound(session.config)
+        and session.exitstatus == pytest.ExitCode.OK
+    ):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    watch = config.stash.get(MEMORY, None)
+    if watch is not None and watch.peak:
+        terminalreporter.write_line(f"peak memory of all processes: {watch.peak:.1f} GB")
+        if watch.peak > _bound(config):
+            terminalreporter.write_line(
+                f"FAILED: more than {_bound(config):g} GB: which kernels do tests compile that tests/kernels.py could?",
+                red=True,
+            )
+
+
+def _bound(config: pytest.Config) -> float:
+    """[GB] for two processes, which CI has, or more in proportion."""
+    return memory.BOUND * max(2, config.option.numprocesses) / 2
+
+
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
+    """After the last test of a file: give back what the program keeps for its next block of cases, 256 MB a process."""
+    arrays = sys.modules.get("fatigue_runner.integrators.memory")
+    if arrays is not None and (nextitem is None or nextitem.path != item.path):
+        arrays._free.clear()
+
+
 def compile_kernels(say: Callable[[str], None]) -> None:
-    """Every method's kernels, in a process of its own; once for each state of the sources, which name the cache's folder."""
+    """What most tests need, in processes of its own; once for each Python and each state of the sources, which name the cache's folder."""
+    from joblib import cpu_count
+
     from fatigue_runner.compiled import cache_folder
 
-    done = cache_folder() / "tests-may-begin"
+    digest = hashlib.sha256(Path(kernels.__file__).read_bytes() + sys.version.encode()).hexdigest()
+    done = cache_folder() / f"tests-may-begin-{digest[:16]}"
     if done.exists():
         return
-    say("compiling the kernels, a minute or two ...")
-    code = "from fatigue_runner.integrators import METHODS, warm_up\nfor name in METHODS: warm_up(name)"
-    if subprocess.run([sys.executable, "-c", code]).returncode == 0 and done.parent.is_dir():
+    say("compiling the kernels, some minutes, once ...")
+    if kernels.compile_all(at_once=min(2, cpu_count())) and done.parent.is_dir():
         done.touch()
 
 
