@@ -6,7 +6,7 @@ import os
 import threading
 from pathlib import Path
 
-BOUND = 5.0  # GB, the whole suite on two processes. Wanted are 4.0: CONTRIBUTING.md has what was measured
+BOUND = 5.5  # GB, the whole suite on two processes. Wanted are 4.0: CONTRIBUTING.md has what was measured
 EVERY = 2.0  # s: a sample takes some 20 ms a GB, and memory grows over minutes
 
 
