@@ -173,6 +173,21 @@ def adaptive(found: Sequence[Point]) -> Table:
     return Table(["method", "evaluations/s", "NRMSE", "DEL error", "mean step [ms]"], rows)
 
 
+def per_state(found: Sequence[Point]) -> Table:
+    """NRMSE of every state."""
+    shown = [p for p in found if p.nrmse]
+    names = list(shown[0].nrmse) if shown else []
+    return Table(["integrator", *names], [[p.label, *(f"{p.nrmse[n]:.0e}" for n in names)] for p in shown])
+
+
+def per_channel(found: Sequence[Point]) -> Table:
+    """DEL error of every channel."""
+    shown = [p for p in found if p.del_error]
+    names = list(dict.fromkeys(name for p in shown for name in p.del_error))
+    rows = [[p.label, *(optional(p.del_error.get(n), ".1e") for n in names)] for p in shown]
+    return Table(["integrator", *names], rows)
+
+
 def limits(rows: Sequence[dict[str, Any]]) -> Table:
     """Stability limits."""
     cells = [

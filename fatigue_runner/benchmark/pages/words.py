@@ -35,6 +35,15 @@ def by_measured_time(result: dict[str, Any]) -> list[str]:
     return [in_words(answer) for answer in answers(result, "wall")]
 
 
+def without_exponential(result: dict[str, Any], cost: str) -> list[str]:
+    """How many times cheaper than the best Runge-Kutta or Adams method, where there is an answer."""
+    return [
+        f"{a.target} {a.ratio:.2f} ({a.classical.series})"
+        for a in answers(result, cost, with_exponential=False)
+        if a.ratio is not None and a.classical is not None
+    ]
+
+
 def winds(result: dict[str, Any]) -> str:
     """What the cases are."""
     kind = "turbulent" if result["turbulent"] else "constant"
