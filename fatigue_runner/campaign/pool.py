@@ -8,6 +8,7 @@ import os
 import signal
 import threading
 import time
+import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
@@ -23,6 +24,7 @@ J = TypeVar("J")
 
 _told: set[str] = set()  # what workers have warned of
 
+FRAMES = 20  # of a traceback that are told
 WATCH = 0.5  # s between two looks of a worker for its parent
 
 
@@ -81,7 +83,8 @@ def _run_in_processes(
     with _backend(joblib, workers, dask), cluster_errors(dask):
         parallel = joblib.Parallel(batch_size=1, return_as="generator_unordered")
         with _born_deaf():
-            results = parallel(joblib.delayed(_guarded)(function, job) for job in jobs)
+            guarded = _guarded if dask is None else _told_in_words
+            results = parallel(joblib.delayed(guarded)(function, job) for job in jobs)
         try:
             yield from results
         except BrokenExecutor as error:  # of loky: TerminatedWorkerError
@@ -161,6 +164,18 @@ def _guarded(function: Callable[[J], T], job: J) -> T:
     if in_worker and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     return function(job)
+
+
+def _told_in_words(function: Callable[[J], T], job: J) -> T:
+    """On a cluster: an error that was not foreseen becomes one of text, since what cannot be pickled never arrives, and the client of
+    joblib would wait for it for ever (seen: RecursionError, whose traceback is too deep)."""
+    try:
+        return _guarded(function, job)
+    except FatigueRunnerError:
+        raise
+    except Exception as error:
+        said = "".join(traceback.format_exception(error, limit=-FRAMES))
+    raise RuntimeError(f"a worker of the cluster failed:\n{said}")
 
 
 def beside(work: Callable[[], T]) -> T:

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import shutil
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 
@@ -19,7 +21,7 @@ import pytest
 
 from fatigue_runner import shipped
 from fatigue_runner.campaign import cluster as cluster_room
-from fatigue_runner.campaign import run_campaign
+from fatigue_runner.campaign import pool, run_campaign
 from fatigue_runner.campaign.block import Setup, run_block, warm_up
 from fatigue_runner.campaign.parcel import folder_of, here, pack, throw_away, unpack
 from fatigue_runner.campaign.plan import make_plan
@@ -105,6 +107,33 @@ def test_the_sample_has_every_kind_once(tmp_path):
     ]
     warm_up(sample)
     assert list(tmp_path.iterdir()) == [tmp_path / "project"], "nothing is written"
+
+
+def _deep(job):
+    return _deep(job)
+
+
+def _with_a_lock(job):
+    error = ValueError("no number")
+    error.lock = threading.Lock()
+    raise error
+
+
+@pytest.mark.parametrize(("work", "words"), [(_deep, "RecursionError"), (_with_a_lock, "no number")])
+def test_an_error_that_could_not_travel_is_told_in_words(work, words):
+    """The client would wait for it for ever."""
+    with pytest.raises(RuntimeError, match=words) as caught:
+        pool._told_in_words(work, None)
+    assert words in str(pickle.loads(pickle.dumps(caught.value)))
+    assert caught.value.__context__ is None and len(str(caught.value)) < 5000
+
+
+def test_an_error_that_is_a_sentence_stays_one():
+    def refuse(job):
+        raise InputError("line 3: no such wind")
+
+    with pytest.raises(InputError, match="line 3"):
+        pool._told_in_words(refuse, None)
 
 
 def test_a_scheduler_that_is_not_there_is_told_before_anything_is_written(tmp_path, monkeypatch):
