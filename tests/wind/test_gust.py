@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulating import simulate_block
 
-from fatigue_runner.campaign.resolve import resolve
+from fatigue_runner.campaign.resolve import named_by, resolve
 from fatigue_runner.campaign.spec import parse_campaign
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.source import Source
@@ -28,7 +28,7 @@ def resolved(duration=60, **wind):
         "integrators": [{"method": "rk4", "step": 0.1}],
     }  # fmt: skip
     source = Source("a.yaml", data, "x", Path())
-    return resolve(parse_campaign(source), source).winds
+    return resolve(named_by(parse_campaign(source), source)).winds
 
 
 def straight(wind, time):

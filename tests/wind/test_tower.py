@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from simulating import simulate_block
 
-from fatigue_runner.campaign.resolve import resolve
+from fatigue_runner.campaign.resolve import named_by, resolve
 from fatigue_runner.campaign.spec import parse_campaign
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.source import Source
@@ -111,7 +111,7 @@ def resolved(folder: Path, turbine="nrel5mw", **wind):
         "integrators": [{"method": "rk4", "step": 0.1}],
     }  # fmt: skip
     source = Source("a.yaml", data, "x", folder)
-    return resolve(parse_campaign(source), source)
+    return resolve(named_by(parse_campaign(source), source))
 
 
 def thicker(folder: Path, rows: str) -> str:

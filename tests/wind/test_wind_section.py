@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fatigue_runner.campaign.resolve import resolve
+from fatigue_runner.campaign.resolve import named_by, resolve
 from fatigue_runner.campaign.spec import parse_campaign
 from fatigue_runner.errors import InputError
 from fatigue_runner.inputs.source import Place, Source
@@ -72,7 +72,7 @@ def doubled():
 
 def test_a_new_source_reaches_a_campaign_without_an_edit_elsewhere(doubled):
     campaign, source = parse({"type": "doubled", "halves": [3, 4]})
-    found = resolve(campaign, source).winds
+    found = resolve(named_by(campaign, source)).winds
     assert [wind.named.id for wind in found] == ["v06.00_doubled", "v08.00_doubled"]
     assert [wind.source.mean_speed for wind in found] == [6.0, 8.0]
     every = {"type": "doubled", "tower_influence": False, "yaw_misalignment": [0.0], "upflow": [0.0]}
