@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import hashlib
 import os
 import sys
@@ -22,6 +24,8 @@ for _library in ("OPENBLAS", "MKL", "OMP"):
 
 # More do not pay: every process loads the kernels anew, and campaigns under test start workers of their own.
 MOST_PROCESSES = 4
+
+TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None  # glibc's
 
 MEMORY = pytest.StashKey[memory.Watch]()
 
@@ -72,11 +76,22 @@ def _bound(config: pytest.Config) -> float:
     return memory.BOUND * max(2, config.option.numprocesses) / 2
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> None:
-    """After the last test of a file: give back what the program keeps for its next block of cases, 256 MB a process."""
+    """After the last test of a file: give back what the program keeps for its next block of cases, 256 MB a process, what the file's
+    own caches hold, and what the allocator keeps of both."""
+    if nextitem is not None and nextitem.path == item.path:
+        return
     arrays = sys.modules.get("fatigue_runner.integrators.memory")
-    if arrays is not None and (nextitem is None or nextitem.path != item.path):
+    if arrays is not None:
         arrays._free.clear()
+    module = getattr(item, "module", None)
+    for value in list(vars(module).values()) if module is not None else ():
+        if getattr(value, "__module__", "") == module.__name__ and hasattr(value, "cache_clear"):
+            value.cache_clear()
+    gc.collect()
+    if TRIM is not None:
+        TRIM(0)
 
 
 def compile_kernels(say: Callable[[str], None]) -> None:

@@ -53,7 +53,7 @@ def elsewhere(function: Callable[[J], T], job: J, workers: int) -> T:
     if workers <= 1:
         return beside(lambda: function(job))
     try:
-        ((result, said),) = _run_in_processes(_relayed, [(function, job)], workers, None)
+        ((result, said),) = _run_in_processes(_relayed, [(function, job, _folder())], workers, None)
     except KeyboardInterrupt:
         dismiss_workers()
         raise
@@ -64,11 +64,21 @@ def elsewhere(function: Callable[[J], T], job: J, workers: int) -> T:
     return result
 
 
-def _relayed(work: tuple[Callable[[J], T], J]) -> tuple[T, list[str]]:
+def _folder() -> str:
+    """Where this process stands; empty where that is gone."""
+    try:
+        return os.getcwd()
+    except OSError:
+        return ""
+
+
+def _relayed(work: tuple[Callable[[J], T], J, str]) -> tuple[T, list[str]]:
     """In a worker: what a function returns, and the warnings of this program that it gave."""
     from fatigue_runner import compiled
 
-    function, job = work
+    function, job, folder = work
+    if folder:  # a worker may be older than the folder that this process has gone to since
+        os.chdir(folder)
     with warnings.catch_warnings(record=True) as caught, compiled.telling():
         warnings.simplefilter("always", FatigueRunnerWarning)
         result = function(job)

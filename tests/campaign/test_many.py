@@ -283,6 +283,18 @@ def test_with_workers_the_run_s_own_process_loads_neither_compiler_nor_report(tm
     assert (tmp_path / "out" / "report.html").is_file() and (tmp_path / "out" / "results.csv").is_file()
 
 
+def test_a_process_that_has_gone_to_another_folder_finds_its_files_there(tmp_path, monkeypatch):
+    """Workers of its first run are still there, and stand where that was."""
+    for speeds in ("[6, 8]", "[7, 9]"):
+        folder = tmp_path / speeds
+        folder.mkdir()
+        monkeypatch.chdir(folder)
+        Path("c.yaml").write_text(CAMPAIGN.replace("[6, 8]", speeds))
+        results = run_campaign("c.yaml", workers=2)
+        assert not results.report_error and (results.out / "report.html").is_file()
+        assert (folder / "runs").is_dir()
+
+
 def test_what_workers_warn_of_is_told_once(monkeypatch):
     monkeypatch.setattr(
         pool, "_run_in_processes", lambda function, jobs, workers, dask: iter([function(*jobs)])
