@@ -6,7 +6,7 @@ import os
 import threading
 from pathlib import Path
 
-BOUND = 5.5  # GB, the whole suite on two processes. Wanted are 4.0: CONTRIBUTING.md has what was measured
+BOUND = 6.5  # GB, the whole suite on two processes: what was measured most, and a fifth. Wanted are 4.0, see CONTRIBUTING.md
 EVERY = 2.0  # s: a sample takes some 20 ms a GB, and memory grows over minutes
 
 
