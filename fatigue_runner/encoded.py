@@ -1,8 +1,10 @@
-"""The bytes of a file that somebody gave: the text that they are, in whatever encoding, and a Git LFS pointer told as one."""
+"""The bytes of a file that somebody gave: the text that they are, in whatever encoding, a Git LFS pointer told as one, a checksum."""
 
 from __future__ import annotations
 
 import codecs
+import os
+import zlib
 from typing import Any
 
 from fatigue_runner.errors import InputError
@@ -47,3 +49,12 @@ def _without_mark(start: bytes) -> str:
         if len(start) == 2 and start[zero] == 0 and (start[1 - zero] >= 0x20 or start[1 - zero] in b"\t\r\n"):
             return name
     return "utf-8"
+
+
+def checksum(path: str | os.PathLike[str]) -> int:
+    """CRC-32 of a whole file; OSError where it cannot be read."""
+    crc = 0
+    with open(path, "rb") as stream:
+        while data := stream.read(1 << 20):
+            crc = zlib.crc32(data, crc)
+    return crc

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fatigue_runner.calibration.fit import Block, Correction, Fit, Form, fit, loads
+from fatigue_runner.calibration.fit import DEGREES, NOTHING, Block, Correction, Fit, Form, fit, loads
 from fatigue_runner.calibration.runs import Ran, RunFolder
-from fatigue_runner.calibration.section import CalibrationSection
+from fatigue_runner.calibration.section import MOST_EXPONENT, CalibrationSection
 from fatigue_runner.calibration.series import Series, read_series
-from fatigue_runner.channels import channel_name
+from fatigue_runner.channels import LOAD_NAMES, channel_name
 from fatigue_runner.errors import InputError
-from fatigue_runner.inputs.files import write_atomically
+from fatigue_runner.inputs.checked_json import from_checked, to_checked
+from fatigue_runner.inputs.files import write_new
 from fatigue_runner.inputs.section import validated
 from fatigue_runner.inputs.source import read_mapping
 
@@ -79,48 +79,29 @@ class Calibration:
             },
         }
 
-    def write(self, path: Path) -> None:
-        """Raises InputError where it cannot be written."""
-        try:
-            write_atomically(path, (json.dumps(self.to_json(), indent=1) + "\n").encode())
-        except OSError as error:
-            raise InputError(
-                f"{path} cannot be written ({error.strerror}); give --out another path"
-            ) from None
+    def write(self, path: Path, overwrite: bool = True) -> None:
+        """Raises InputError where it cannot be written, or holds something else already and is not to be overwritten."""
+        write_new(path, to_checked(self.to_json()), overwrite)
 
     @classmethod
     def read(cls, path: Path) -> Calibration:
         """Raises InputError for a file that is no calibration."""
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
+            data = from_checked(path.read_bytes())
             if data["kind"] != KIND or data["version"] != VERSION:
                 raise ValueError("of another kind or version")
-            corrections, errors = {}, {}
-            for name, c in data["channels"].items():
-                width = int(c["degree"]) + 1
-                arrays = (
-                    np.array(c["coefficients"], float).reshape(3, width),
-                    np.array(c["resampled"], float).reshape(len(c["resampled"]), 3, width),
-                )
-                form, (low, high) = Form(int(c["degree"]), bool(c["shaped"])), c["standard_deviations"]
-                first, last = c["winds"]
-                corrections[name] = Correction(
-                    form, *arrays, (float(first), float(last)), (float(low), float(high))
-                )
-                errors[name] = dict(c["errors_on_blocks_left_out"])
+            corrections = {name: _correction(name, c) for name, c in data["channels"].items()}
+            errors = {name: dict(c["errors_on_blocks_left_out"]) for name, c in data["channels"].items()}
             exponents = tuple(float(m) for m in data["wohler_exponents"])
+            if not corrections or not exponents or not all(0 < m <= MOST_EXPONENT for m in exponents):
+                raise ValueError("without a channel or a Wöhler exponent")
+            name, turbine, turbine_hash = (str(data[key]) for key in ("name", "turbine", "turbine_hash"))
             return cls(
-                data["name"],
-                data["turbine"],
-                data["turbine_hash"],
-                exponents,
-                corrections,
-                tuple(data["runs"]),
-                errors,
+                name, turbine, turbine_hash, exponents, corrections, tuple(map(str, data["runs"])), errors
             )
         except OSError as error:
             raise InputError(f"{path} cannot be read ({error.strerror})") from None
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InputError(
                 f"{path} is no calibration ({error}); make one with `fatigue-runner calibrate fit`"
             ) from None
@@ -132,6 +113,24 @@ class Calibration:
                 f"{run.folder} was run with another turbine ({run.turbine}, hash {run.turbine_hash[:12]}) than {self.name} was made for "
                 f"({self.turbine}, {self.turbine_hash[:12]}); calibrate for it"
             )
+
+
+def _correction(name: str, c: dict[str, Any]) -> Correction:
+    """Of a file. Raises ValueError for what no fit writes."""
+    if name not in LOAD_NAMES:
+        raise ValueError(f"{name!r} is no load")
+    form = Form(int(c["degree"]), bool(c["shaped"]))
+    if form.degree not in (NOTHING, *DEGREES):
+        raise ValueError(f"{name} has the degree {form.degree}")
+    width = form.degree + 1
+    own = np.array(c["coefficients"], float).reshape(3, width)
+    drawn = np.array(c["resampled"], float).reshape(len(c["resampled"]), 3, width)
+    (first, last), (low, high) = np.array([c["winds"], c["standard_deviations"]], float).tolist()
+    if not len(drawn):
+        raise ValueError(f"{name} has no resampled fits, of which its interval is made")
+    if not (np.isfinite(own).all() and np.isfinite(drawn).all() and 0 < first <= last and 0 < low <= high):
+        raise ValueError(f"{name} has figures that no fit makes")
+    return Correction(form, own, drawn, (first, last), (low, high))
 
 
 def calibrate(path: Path) -> tuple[Calibration, list[Judged]]:

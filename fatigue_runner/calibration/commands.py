@@ -18,6 +18,9 @@ COLUMNS = (
     *("case_id", "wind_speed", "channel", "wohler_exponent", "del", "del_calibrated", "low", "high"),
     "extrapolates",
 )
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace a file that is there and holds something else.")
+]
 
 
 @app.command()
@@ -35,6 +38,7 @@ def fit(
             callback=lambda path: writable_file(path, "--out"),
         ),
     ] = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Fit the corrections, and judge them on what was left out.
 
@@ -57,12 +61,12 @@ def fit(
 
     found, judged = calibrate(file)
     path = out or Path(f"{found.name}.calibration.json")
-    found.write(path)
     to = console()
     for table in tables(found, judged):
         to.print(table)
         to.print()
     to.print(verdict(judged), highlight=False)
+    found.write(path, overwrite)
     typer.echo(f"calibration: {path}")
 
 
@@ -73,6 +77,7 @@ def apply(
     method: Annotated[
         str, typer.Option("--method", "-m", help="Integrator, where the run has several (`rk4 50 ms`).")
     ] = "",
+    overwrite: Overwrite = False,
 ) -> None:
     """Correct the loads of a run, each with its uncertainty; writes `calibrated.csv` into its folder.
 
@@ -82,8 +87,7 @@ def apply(
     """
     from fatigue_runner.calibration.calibration import Calibration, corrected
     from fatigue_runner.calibration.runs import RunFolder
-    from fatigue_runner.errors import InputError
-    from fatigue_runner.inputs.files import write_atomically
+    from fatigue_runner.inputs.files import write_new
 
     made = Calibration.read(calibration)
     found = corrected(made, RunFolder.read(run), method)
@@ -97,10 +101,7 @@ def apply(
                 [c.case, f"{c.wind:g}", c.channel, f"{m:g}", *(f"{v:.6g}" for v in values), c.extrapolates]
             )
     path = run / "calibrated.csv"
-    try:
-        write_atomically(path, text.getvalue().encode())
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror})") from None
+    write_new(path, text.getvalue().encode(), overwrite)
     console().print(applied(found))
     outside = sorted({c.case for c in found if c.extrapolates})
     if outside:

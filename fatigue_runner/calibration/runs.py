@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +13,7 @@ from fatigue_runner.channels import channel_name
 from fatigue_runner.errors import InputError
 from fatigue_runner.naming import file_id
 from fatigue_runner.results.cells import Row, integrator, number, text, truth
+from fatigue_runner.results.run_file import read_run_file
 from fatigue_runner.results.table import read_results
 
 Array = NDArray[np.float64]
@@ -49,16 +48,13 @@ class RunFolder:
     def read(cls, folder: Path) -> RunFolder:
         """Raises InputError for a folder without results or without run.json."""
         rows = [row for row in read_results(folder) if text(row, "status") == "done"]
-        stored: Mapping[str, Any]
         try:
-            stored = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+            stored = read_run_file(folder)
             facts, campaign = stored["facts"], stored["campaign"]
             found = str(facts["turbine"]), str(facts["turbine_hash"]), float(campaign["discard"])
             exponents = tuple(float(m) for m in campaign["fatigue"]["wohler_exponents"])
         except (OSError, ValueError, KeyError, TypeError):
-            raise InputError(
-                f"{folder / 'run.json'} cannot be read; give the folder of a run of this program"
-            ) from None
+            raise InputError(f"{folder} has no run.json of this program; give the folder of a run") from None
         own = [row for row in rows if not truth(row, "is_reference")]
         return cls(folder, own, *found, exponents)
 

@@ -22,6 +22,8 @@ from fatigue_runner.channels import FATIGUE_CHANNELS, LOAD_NAMES, channel_name
 from fatigue_runner.errors import did_you_mean
 from fatigue_runner.inputs.section import Section, problem
 
+MOST_EXPONENT = 40.0
+
 
 def _named(name: str) -> str:
     if not re.fullmatch(r"[\w.-]{1,80}", name):
@@ -45,7 +47,9 @@ class CalibrationSection(Section):
     method: str = ""
     start: float | None = Field(default=None, ge=0)
     channels: list[str] = Field(default=list(FATIGUE_CHANNELS), min_length=1)
-    wohler_exponents: list[Annotated[float, Field(gt=0, le=40)]] | None = Field(default=None, min_length=1)
+    wohler_exponents: list[Annotated[float, Field(gt=0, le=MOST_EXPONENT)]] | None = Field(
+        default=None, min_length=1
+    )
     blocks: int = Field(default=2, ge=1, le=20)
     series: list[SeriesSection] = Field(min_length=1)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import shutil
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +58,8 @@ def followed(take_in: Callable[[], Any]) -> Iterator[None]:
 
     def look() -> None:
         while not over.wait(EVERY):
-            take_in()
+            with suppress(OSError):  # a full disk: whoever takes in the block's own records says so
+                take_in()
 
     thread = threading.Thread(target=look, daemon=True)
     thread.start()

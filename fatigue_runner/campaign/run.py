@@ -83,6 +83,7 @@ def _system_error(error: OSError, folder: Path | None) -> str:
     helps = {
         errno.ENOSPC: "free some space on that disk",
         errno.EDQUOT: "free some of your quota on that disk",
+        errno.EFBIG: "allow larger files (`ulimit -f`), or choose another --out",
         errno.EROFS: "make it writable again, or choose another --out",
         errno.EACCES: "make it writable again, or choose another --out",
         errno.ENOENT: "the folder was removed while the campaign ran",
@@ -126,6 +127,7 @@ def _run_campaign(
             with stage("table"):
                 results = _collect(plan, store, simulated, settled)
             if not settled:
+                store.unsettle()
                 _write(results, helpers, progress)
             if not results.report_error:
                 _settle(results, plan, store)
@@ -202,6 +204,8 @@ def _write_report(out: Path) -> str:
 
     try:
         write_report(out)
+    except FatigueRunnerError as error:
+        return str(error)
     except Exception as error:
         return f"{type(error).__name__}: {error}"
     return ""

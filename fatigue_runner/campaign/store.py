@@ -13,7 +13,6 @@ A finished case is kept when its hash is unchanged, its record is whole (each ha
 from __future__ import annotations
 
 import errno
-import json
 import os
 import threading
 import zlib
@@ -26,17 +25,19 @@ from typing import IO, Any, NamedTuple
 from fatigue_runner.campaign.cases import Case
 from fatigue_runner.campaign.pieces import FOLDER, Pieces
 from fatigue_runner.campaign.provenance import program_hash
+from fatigue_runner.encoded import checksum
 from fatigue_runner.errors import FatigueRunnerError, InputError
+from fatigue_runner.inputs.checked_json import to_checked
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.naming import LONGEST_NAME
 from fatigue_runner.results.records import Head, from_line, head_of, lines_of, to_line
 from fatigue_runner.results.rows import Rows
+from fatigue_runner.results.run_file import MADE, read_run_file, write_run_file
 
 # What all cases of a folder have in common. Where it differs, no finished case could be kept.
 _IDENTITY = ("name", "code", "turbine_hash", "duration", "output_rate", "initial", "pitch")
 _RESULTS = ("results.csv", "columns.csv", "results.parquet", "lifetime.csv", "damage.csv", "report.html")
 _OWN = {"campaign.yaml", "run.json", "cases.jsonl", FOLDER, "logs", *_RESULTS}
-MADE = "results"  # entry of run.json: what the results were made of, and what they were then
 ANSWER = "answer"  # entry of run.json: what was asked for, and what the results say of it, where every case is finished
 
 
@@ -146,18 +147,20 @@ class Store:
     def settle(self, answer: dict[str, Any] | None) -> None:
         """Remember what the results were made of and, where every case is finished, what they say. The store may be closed already."""
         said = {} if answer is None else {ANSWER: answer}
-        write_atomically(
-            self.out / "run.json", _as_json(self._about | {MADE: self._made(self._about)} | said)
-        )
+        write_run_file(self.out, self._about | {MADE: self._made(self._about)} | said)
+
+    def unsettle(self) -> None:
+        """The results are about to be others than run.json knows."""
+        write_run_file(self.out, self._about)
 
     def _made(self, about: dict[str, Any]) -> dict[str, Any]:
         """Checksums of what decides the results, and of the results."""
-        from fatigue_runner.logbook import checksum
-
-        files = [path for name in ("cases.jsonl", *_RESULTS) if (path := self.out / name).exists()]
+        files = [
+            path for name in ("campaign.yaml", "cases.jsonl", *_RESULTS) if (path := self.out / name).exists()
+        ]
         return {
             "program": program_hash(),
-            "run.json": zlib.crc32(_as_json(about)),
+            "run.json": zlib.crc32(to_checked(about)),
             **{path.name: checksum(path) for path in files},
         }
 
@@ -197,7 +200,7 @@ class Store:
         write_atomically(self.out / "campaign.yaml", campaign_text.encode())
         self._about = self.identity | run
         made = {key: self.earlier[key] for key in (MADE, ANSWER) if key in self.earlier}
-        write_atomically(self.out / "run.json", _as_json(self._about | made))
+        write_run_file(self.out, self._about | made)
 
     def add(self, records: Iterable[dict[str, Any]]) -> int:
         """Append the records of finished cases; they survive whatever happens next. Returns how many were not there yet."""
@@ -250,9 +253,7 @@ class Store:
         if not self.out.is_dir():
             raise InputError(f"{self.out} is a file; give --out a folder")
         try:
-            theirs = json.loads((self.out / "run.json").read_text())
-            if not isinstance(theirs, dict):
-                raise ValueError("no mapping")
+            theirs = read_run_file(self.out)
         except FileNotFoundError:
             # a run that was killed early leaves its own files without run.json; each record says itself what it is of
             names = {path.name.removesuffix(".part") for path in self.out.iterdir()}
@@ -262,14 +263,6 @@ class Store:
                     f"{self.out} holds files but no run; give --out a new or empty folder"
                 ) from None
             return
-        except OSError as error:
-            raise InputError(
-                f"{self.out / 'run.json'} cannot be read ({error.strerror}); choose another --out"
-            ) from None
-        except ValueError:
-            raise InputError(
-                f"{self.out / 'run.json'} is damaged; delete it, and the same command goes on with the finished cases of the folder"
-            ) from None
         for key, mine in self.identity.items():
             if theirs.get(key) != mine and (key == "name" or not self._fresh):
                 raise InputError(f"{self.out} {_difference(key, theirs.get(key), mine)}")
@@ -307,8 +300,6 @@ class Store:
 
     def _log_complete(self, head: Head) -> bool:
         """Whether the log is, to the last bit, what was written."""
-        from fatigue_runner.logbook import checksum
-
         case_id, record = head.case_id, head.record
         path = self.log_path(case_id)
         try:
@@ -331,10 +322,6 @@ class Store:
         self._journal.seek(0)
         for name in _RESULTS:
             (self.out / name).unlink(missing_ok=True)
-
-
-def _as_json(data: dict[str, Any]) -> bytes:
-    return json.dumps(data, indent=1).encode()
 
 
 def _refuse_place(out: Path) -> None:

@@ -1,12 +1,15 @@
 """A corrector's file: safetensors, never pickle: the map's arrays and a JSON header with all the rest.
 
 The header is flat and its keys are the same for every map: those that a map does not know have the value that means nothing. `states`
-and `wind` name what the map sees, where that is more than the turbine's own states and the wind's first three signals.
+and `wind` name what the map sees, where that is more than the turbine's own states and the wind's first three signals. A checksum of
+header and arrays stands beside them: a weight with a flipped bit is a weight, and nothing else would tell.
 """
 
 from __future__ import annotations
 
 import json
+import zlib
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -49,7 +52,17 @@ def save(corrector: Corrector, path: Path) -> None:
         for number, rung in enumerate(corrector.rungs, start=1):
             tensors |= {_of_rung(number, name): weights for name, weights in rung.map.tensors().items()}
     tensors = {name: np.ascontiguousarray(array) for name, array in tensors.items()}
-    write_atomically(path, to_bytes(tensors, metadata={"format": FORMAT, "header": json.dumps(header)}))
+    text = json.dumps(header)
+    metadata = {"format": FORMAT, "header": text, "crc32": _checksum(text, tensors)}
+    write_atomically(path, to_bytes(tensors, metadata=metadata))
+
+
+def _checksum(header: str, tensors: Mapping[str, np.ndarray]) -> str:
+    crc = zlib.crc32(header.encode())
+    for name, array in sorted(tensors.items()):
+        crc = zlib.crc32(f"{name} {array.dtype.str} {array.shape}".encode(), crc)
+        crc = zlib.crc32(array.tobytes(), crc)
+    return f"{crc:08x}"
 
 
 def _of_rung(number: int, name: str) -> str:
@@ -109,7 +122,8 @@ def load(path: Path | str) -> Corrector:
     try:
         with safe_open(path, framework="numpy") as f:
             metadata = f.metadata() or {}
-            tensors = {k: f.get_tensor(k).astype(float) for k in f.keys()}  # noqa: SIM118 - not a mapping
+            stored = {k: f.get_tensor(k) for k in f.keys()}  # noqa: SIM118 - not a mapping
+        tensors = {name: array.astype(float) for name, array in stored.items()}
     except (SafetensorError, OSError, ValueError) as error:
         raise CorrectorError(
             f"{path} is not a whole safetensors file ({error}); copy or train it anew"
@@ -130,11 +144,26 @@ def load(path: Path | str) -> Corrector:
             first = _of_rung(number, "")
             own = {k.removeprefix(first): v for k, v in tensors.items() if k.startswith(first)}
             rungs.append(_corrector(below, own))
-        return _corrector(header, tensors, tuple(rungs))
+        found = _corrector(header, tensors, tuple(rungs))
+        _refuse_more(found, tensors)
     except InputError as error:
         raise CorrectorError(f"{path}: {error}; copy or train it anew") from None
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise CorrectorError(f"{path}: header and arrays do not fit ({error}); train it anew") from None
+    if metadata.get("crc32") not in (None, _checksum(metadata["header"], stored)):
+        raise CorrectorError(
+            f"{path} is damaged: header and arrays are not those that were saved; copy or train it anew"
+        )
+    return found
+
+
+def _refuse_more(corrector: Corrector, tensors: Mapping[str, Any]) -> None:
+    """Raises CorrectorError for arrays that the header does not name: somebody meant them to count."""
+    known = set(corrector.map.tensors())
+    for number, rung in enumerate(corrector.rungs, start=1):
+        known |= {_of_rung(number, name) for name in rung.map.tensors()}
+    if more := sorted(tensors.keys() - known):
+        raise CorrectorError(f"the header does not name the arrays {', '.join(more[:4])}")
 
 
 def _corrector(

@@ -9,6 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from fatigue_runner.errors import InputError
+
 
 def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
     """Write `content`, whole or in parts, under a temporary name, flush it to the disk, rename: nobody ever sees half a file."""
@@ -23,6 +25,19 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
         with suppress(OSError):
             part.unlink()
         raise
+
+
+def write_new(path: Path, content: bytes, overwrite: bool) -> None:
+    """The same for what somebody may want to keep. Raises InputError where something else is there already, unless `overwrite`, and where
+    it cannot be written."""
+    try:
+        if not overwrite and path.exists() and path.read_bytes() != content:
+            raise InputError(
+                f"{path} is there already and holds something else; move it, or give --overwrite to replace it"
+            )
+        write_atomically(path, content)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); choose another place") from None
 
 
 def to_yaml(heading: str, data: dict[str, Any]) -> str:

@@ -18,6 +18,8 @@ MAX_VALUES = 100_000
 MAX_DEPTH = 32
 _PLAIN = (bool, int, float, str, datetime.date, type(None))
 _TAG = re.compile(r"(?:^|[\s\[{,:-])(![^\s,\]}]*)")
+# a quoted text or a comment, in which brackets mean nothing; else a bracket or the end of a line
+_BRACKETS = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'[^'\n]*'|(?<!\S)#[^\n]*|[\[\]{}\n]")
 
 
 @dataclass(frozen=True)
@@ -217,6 +219,7 @@ def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
     """The mapping in a YAML text from `path`. Raises InputError as `read_mapping`."""
     from ruamel.yaml import YAML
     from ruamel.yaml.error import MarkedYAMLError, YAMLError
+    from ruamel.yaml.reader import ReaderError
 
     _refuse_endless(text, path, what)
     try:
@@ -228,21 +231,27 @@ def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
         raise InputError(
             f"{place}: {_yaml_problem(error)}{'; remove the tag (`!...`)' if tagged else ''}"
         ) from None
-    except YAMLError as error:  # e.g. control characters: no mark
+    except ReaderError as error:
+        line = text[: int(error.position)].count("\n") + 1
+        raise InputError(
+            f"{path}:{line}: not valid YAML: the control character U+{ord(text[int(error.position)]):04X} stands there; remove it"
+        ) from None
+    except YAMLError as error:
         raise InputError(f"{path}: not valid YAML: {' '.join(str(error).split())}") from None
     except (ValueError, TypeError, AttributeError, KeyError) as error:  # of a value whose tag does not fit it
         raise InputError(
             f"{_first_tag(text, path)}: a tag (`!!...`) does not fit its value, {' '.join(str(error).split())}; remove the tag"
         ) from None
     except RecursionError:
-        raise InputError(f"{path}: not a {what}: its brackets nest too deeply") from None
+        raise InputError(f"{path}:{_deep(text)}: not a {what}: its values nest too deeply") from None
     if not isinstance(data, Mapping):
         raise InputError(f"{path}:1: a {what} is a mapping of keys ({keys})")
     return Source(str(path), data, text, path.absolute().parent, what)
 
 
 def _refuse_endless(text: str, path: Path, what: str) -> None:
-    """Raises InputError, at the longest line, for more values than a person writes: the parser would take minutes for them."""
+    """Raises InputError, with the line, for more values than a person writes, and for more brackets in each other: the parser would
+    take minutes for them."""
     count = text.count(",") + text.count("\n")
     if count > MAX_VALUES:
         lines = text.split("\n")
@@ -251,6 +260,31 @@ def _refuse_endless(text: str, path: Path, what: str) -> None:
             f"{path}:{longest + 1}: about {count:,} values, and a {what} holds {MAX_VALUES:,} at most; a sweep can be written as "
             "{start, stop, count}, long series belong in files of their own"
         )
+    line, depth = _deepest(text)
+    if depth > 4 * MAX_DEPTH:  # far more than are allowed, since quotes are not always what they look like
+        raise InputError(f"{path}:{line}: not a {what}: its brackets nest too deeply")
+
+
+def _deepest(text: str) -> tuple[int, int]:
+    """The line on which most brackets are open in each other, and how many."""
+    line, depth, found = 1, 0, (1, 0)
+    for sign in _BRACKETS.finditer(text):
+        line += sign[0].count("\n")
+        depth = max(0, depth + (sign[0] in "[{") - (sign[0] in "]}"))
+        found = max(found, (line, depth), key=lambda place: place[1])
+    return found
+
+
+def _deep(text: str) -> int:
+    """The line to look at where values nest too deeply: of the brackets, or where there are none of the deepest indentation."""
+    line, depth = _deepest(text)
+    lines = text.split("\n")
+    return line if depth > MAX_DEPTH else 1 + max(range(len(lines)), key=lambda i: _indent(lines[i]))
+
+
+def _indent(line: str) -> int:
+    """Columns before a line's first value; `- - a` is two lists."""
+    return len(line) - len(line.lstrip(" -?"))
 
 
 def _first_tag(text: str, path: Path) -> str:

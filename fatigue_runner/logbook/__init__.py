@@ -10,7 +10,7 @@ the names of channels.
 from fatigue_runner.logbook.check import Check, check
 from fatigue_runner.logbook.errors import LogError
 from fatigue_runner.logbook.export import export
-from fatigue_runner.logbook.metadata import checksum, read_metadata
+from fatigue_runner.logbook.metadata import read_metadata
 from fatigue_runner.logbook.reader import Log, read_log
 from fatigue_runner.logbook.recovery import Recovery, recover
 from fatigue_runner.logbook.summary import LogSummary, summarise
@@ -26,7 +26,6 @@ __all__ = [
     "LogWriter",
     "Recovery",
     "check",
-    "checksum",
     "export",
     "log_of",
     "read_log",

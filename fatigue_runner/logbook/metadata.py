@@ -104,12 +104,3 @@ def read_metadata(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     except Damage as damage:
         raise LogError(f"{path}: {damage}") from None
     return contents.metadata
-
-
-def checksum(path: str | os.PathLike[str]) -> int:
-    """CRC-32 of the whole file, as its writer had it in `LogWriter.checksum`; OSError where it cannot be read."""
-    crc = 0
-    with open(path, "rb") as stream:
-        while data := stream.read(1 << 20):
-            crc = zlib.crc32(data, crc)
-    return crc

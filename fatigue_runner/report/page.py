@@ -21,7 +21,9 @@ def write_report(run_dir: Path) -> Path:
     try:
         write_atomically(target, html.encode())
     except OSError as error:
-        raise InputError(f"{target} cannot be written: {error.strerror}; make the folder writable") from None
+        raise InputError(
+            f"{target} cannot be written: {error.strerror}; make room there, or make the folder writable"
+        ) from None
     return target
 
 

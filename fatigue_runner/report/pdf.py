@@ -55,6 +55,6 @@ def write_pdf(page: Path) -> Path:
             os.replace(beside, target)
         except OSError as error:
             raise InputError(
-                f"{target} cannot be written: {error.strerror}; make the folder writable"
+                f"{target} cannot be written: {error.strerror}; make room there, or make the folder writable"
             ) from None
     return target

@@ -6,7 +6,7 @@ Settings and facts come from `run.json`; a folder without one (results from else
 
 from __future__ import annotations
 
-import json
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -14,13 +14,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fatigue_runner.errors import FatigueRunnerError, InputError
+from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning, InputError
 from fatigue_runner.inputs.source import read_mapping
 from fatigue_runner.results.cells import Row, number, text
 from fatigue_runner.results.columns import WIND
 from fatigue_runner.results.lifetime_section import LifetimeSection
 from fatigue_runner.results.ranking import MethodSummary, fatigue_columns, integrator_key, rank, reference_of
-from fatigue_runner.results.table import read_rows
+from fatigue_runner.results.run_file import read_run_file
+from fatigue_runner.results.table import changed_files, read_rows
 
 if TYPE_CHECKING:
     from fatigue_runner.logbook import Log
@@ -114,6 +115,7 @@ class Run:
             return None
 
     no_life: str = ""  # why there is none
+    changed: Sequence[str] = ()  # what of the folder is not what the run left, in sentences
     planned: int | None = None  # cases of the campaign, where the folder says so
     evaluation_times: Mapping[
         str, Mapping[str, float]
@@ -184,38 +186,37 @@ def load_run(folder: Path) -> Run:
     Raises InputError, one sentence, for a folder without results, an empty or foreign table, or unreadable
     settings.
     """
-    run = Run(folder, read_rows(folder), *_read_settings(folder))
-    planned, times = (_stored(folder, key) for key in ("cases", "evaluation_times"))
+    stored = _stored(folder)
+    run = Run(folder, read_rows(folder), *_settings(folder, stored))
+    planned, times = stored.get("cases"), stored.get("evaluation_times")
     run.planned = planned if isinstance(planned, int) else None
     run.evaluation_times = times if isinstance(times, Mapping) else {}
+    run.changed = changed_files(folder)
     return run
 
 
-def _stored(folder: Path, key: str) -> Any:
+def _stored(folder: Path) -> Mapping[str, Any]:
+    """run.json; empty where there is none."""
     try:
-        return json.loads((folder / "run.json").read_text(encoding="utf-8")).get(key)
-    except (OSError, ValueError, AttributeError):
-        return None
+        return read_run_file(folder)
+    except OSError:
+        return {}
 
 
-def _read_settings(
-    folder: Path,
+def _settings(
+    folder: Path, stored: Mapping[str, Any]
 ) -> tuple[Mapping[str, Any], Mapping[str, str], Mapping[str, list[str]], Mapping[str, list[float]]]:
     """The resolved campaign, the facts (turbine, hash, versions, machine), what is said of the winds, steady operation; empty where
     unknown."""
-    try:
-        stored = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-        campaign = stored["campaign"]
-        facts, wind, curve = (stored.get(name, {}) for name in ("facts", "wind", "operating_curve"))
-        if all(isinstance(part, Mapping) for part in (campaign, facts, wind, curve)):
-            return campaign, facts, wind, curve
-    except FileNotFoundError:
-        pass
-    except (OSError, ValueError, KeyError, TypeError):
+    if not stored:
+        return _read_campaign(folder / "campaign.yaml"), {}, {}, {}
+    campaign = stored.get("campaign")
+    facts, wind, curve = (stored.get(name, {}) for name in ("facts", "wind", "operating_curve"))
+    if not all(isinstance(part, Mapping) for part in (campaign, facts, wind, curve)):
         raise InputError(
-            f"{folder / 'run.json'} cannot be read; run the campaign again into a new folder"
-        ) from None
-    return _read_campaign(folder / "campaign.yaml"), {}, {}, {}
+            f"{folder / 'run.json'} is of no run of this program; run the campaign again into a new folder"
+        )
+    return campaign, facts, wind, curve  # type: ignore[return-value]
 
 
 def _read_campaign(path: Path) -> Mapping[str, Any]:
@@ -229,5 +230,6 @@ def _read_log(path: Path) -> Log | None:
 
     try:
         return read_log(path)
-    except (FatigueRunnerError, OSError):
+    except (FatigueRunnerError, OSError) as error:
+        warnings.warn(f"the page goes without a log: {error}", FatigueRunnerWarning, stacklevel=2)
         return None

@@ -7,6 +7,7 @@ import io
 import itertools
 import math
 import re
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,14 +16,15 @@ from typing import TYPE_CHECKING, Any, overload
 
 from fatigue_runner.channels import channel_name
 from fatigue_runner.encoded import decoded
-from fatigue_runner.errors import InputError, did_you_mean
+from fatigue_runner.errors import FatigueRunnerWarning, InputError, did_you_mean
 from fatigue_runner.inputs.files import write_atomically
 from fatigue_runner.results.columns import NEEDED, Column, kind_of, units_csv
 from fatigue_runner.results.frames import to_arrow, to_pandas
 from fatigue_runner.results.operation import pitch_rate_sentences
 from fatigue_runner.results.ranking import MethodSummary, as_data, from_data, rank
-from fatigue_runner.results.records import from_line, lines_of
+from fatigue_runner.results.records import from_line, head_of, lines_of
 from fatigue_runner.results.rows import Rows
+from fatigue_runner.results.run_file import as_left
 
 if TYPE_CHECKING:
     from fatigue_runner.results.lifetime import Life
@@ -194,10 +196,12 @@ def _with_point(cell: str) -> str:
 
 
 def _finished_cases(journal: Path) -> list[dict[str, Any]]:
-    """The last row of every case of a journal; a line that a crash cut off is as if it were never written."""
+    """The last row of every case of a journal; a line that is damaged or was cut off is as if it were never written."""
     with journal.open("rb") as file:
         records = (from_line(line.rstrip(b"\n")) for _, line in lines_of(file))
         found = {record["row"]["case_id"]: record["row"] for record in records if record is not None}
+    for sentence in changed_files(journal.parent):
+        warnings.warn(sentence, FatigueRunnerWarning, stacklevel=2)
     if not found:
         raise InputError(
             f"{journal.parent}: the run has not finished a case yet; `fatigue-runner run` goes on with it"
@@ -228,6 +232,20 @@ def read_rows(folder: Path) -> Rows:
     return found
 
 
+def changed_files(folder: Path) -> list[str]:
+    """What of the rows of a run folder is not what the run left, in sentences: people edit tables, and disks lose bits."""
+    if not _unfinished(folder):
+        table = folder / "results.csv"
+        changed = not as_left(table)
+        said = f"{table} is not what the run wrote: it was changed since, or is damaged; `fatigue-runner run` writes it anew"
+        return [said] if changed else []
+    journal = folder / "cases.jsonl"
+    with journal.open("rb") as file:
+        damaged = sum(line.endswith(b"\n") and head_of(line) is None for _, line in lines_of(file))
+    said = f"{damaged} records in {journal} are damaged and left out; `fatigue-runner run` runs these cases again"
+    return [said] if damaged else []
+
+
 def _unfinished(folder: Path) -> bool:
     return not (folder / "results.csv").is_file() and (folder / "cases.jsonl").is_file()
 
@@ -240,7 +258,10 @@ def _read(folder: Path) -> tuple[list[str], Iterable[list[str]]]:
             what = "is a file" if folder.exists() else "does not exist"
             raise InputError(f"{folder} {what}; give the output folder of `fatigue-runner run`")
         raise InputError(f"{folder} holds no results.csv; give the output folder of `fatigue-runner run`")
-    rows = _told(_text_rows(_text_of(table)), table)
+    text = _text_of(table)
+    for sentence in changed_files(folder):
+        warnings.warn(sentence, FatigueRunnerWarning, stacklevel=2)
+    rows = _told(_text_rows(text), table)
     names, first = next(rows, []), next(rows, None)
     if first is None:
         raise InputError(f"{table} has no cases; run the campaign again to fill it")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from fatigue_runner.results.cells import Row
 from fatigue_runner.results.frames import rows_of
 from fatigue_runner.results.lifetime import Life, life_of
 from fatigue_runner.results.lifetime_section import LifetimeSection
+from fatigue_runner.results.run_file import read_run_file
 from fatigue_runner.results.table import read_rows
 
 
@@ -53,7 +53,7 @@ def lifetime(results: Any, climate: Any = None, **keys: Any) -> ToldLife:
 def _section_of(folder: Path) -> dict[str, Any]:
     """What the campaign of a run folder says of its life; nothing where it says nothing."""
     try:
-        found = json.loads((folder / "run.json").read_text(encoding="utf-8"))["campaign"].get("lifetime")
-    except (OSError, ValueError, KeyError, AttributeError):
+        found = read_run_file(folder)["campaign"].get("lifetime")
+    except (OSError, KeyError, AttributeError):
         return {}
     return {key: value for key, value in (found or {}).items() if value is not None}

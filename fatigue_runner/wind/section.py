@@ -60,14 +60,38 @@ class Realisation:
     angles: tuple[float, float] = (0.0, 0.0)
 
     def build(self, rotor: Rotor | None = None) -> WindSource:
-        """The wind source as it blows on this rotor, or on none yet; raises InputError for parameters that it refuses."""
+        """The wind source as it blows on this rotor, or on none yet; raises InputError for parameters that it refuses, and for a file
+        that is not the one any more which the campaign was made of."""
         wind = make_wind(self.kind, **dict(self.parameters))
         if self.tower:
             wind = make_wind("tower-influence", wind=wind)
         if any(self.angles):
             yaw, upflow = self.angles
             wind = make_wind("misaligned", wind=wind, yaw_misalignment=yaw, upflow=upflow)
-        return wind if rotor is None else wind.on(rotor)
+        if rotor is None:
+            return wind
+        wind = wind.on(rotor)
+        self._refuse_another_file(wind)
+        return wind
+
+    def _refuse_another_file(self, wind: WindSource) -> None:
+        if not self.contents:
+            return
+        from fatigue_runner.wind.fields.on_rotor import content
+
+        _ = (
+            wind.channels
+        )  # reads it, where that has not been done: what is checked afterwards is what was read
+        for name, digest in self.contents:
+            path = dict(self.parameters)[name]
+            try:
+                same = content(Path(path)) == digest
+            except OSError:
+                same = False
+            if not same:
+                raise InputError(
+                    f"{path}: the wind file was changed or removed while the campaign ran; run it again"
+                )
 
     @property
     def file(self) -> str | None:

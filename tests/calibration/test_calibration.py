@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from fatigue_runner.calibration.commands import app
 from fatigue_runner.calibration.fit import Block, Form, fit, loads, shaped
 from fatigue_runner.calibration.series import read_series
 from fatigue_runner.errors import InputError
+from fatigue_runner.inputs.checked_json import to_checked
 from fatigue_runner.logbook import read_log
 
 EXPONENTS = (3.0, 4.0, 10.0)
@@ -199,10 +201,62 @@ def test_fit_writes_what_apply_uses(ground, tmp_path):
 
 def test_a_calibration_of_another_turbine_is_refused(ground, tmp_path):
     out = tmp_path / "richer.json"
-    calibrate(ground / "calibration.yaml")[0].write(out)
-    out.write_text(out.read_text().replace(Calibration.read(out).turbine_hash, "0" * 64))
+    replace(calibrate(ground / "calibration.yaml")[0], turbine_hash="0" * 64).write(out)
     done = CliRunner().invoke(app, ["apply", str(out), str(ground / "run")])
     assert isinstance(done.exception, InputError) and "was run with another turbine" in str(done.exception)
+
+
+@pytest.fixture(scope="module")
+def made(ground):
+    return calibrate(ground / "calibration.yaml")[0]
+
+
+def test_what_somebody_may_want_to_keep_is_not_overwritten(ground, made, tmp_path):
+    out, table = tmp_path / "richer.json", ground / "run" / "calibrated.csv"
+    made.write(out)
+    table.write_text("of another calibration")
+    refused = CliRunner().invoke(app, ["apply", str(out), str(ground / "run")])
+    assert isinstance(refused.exception, InputError) and "give --overwrite" in str(refused.exception)
+    assert table.read_text() == "of another calibration"
+    for more in (["--overwrite"], []):  # the same again is no other
+        assert CliRunner().invoke(app, ["apply", str(out), str(ground / "run"), *more]).exit_code == 0
+    out.write_text("mine")
+    with pytest.raises(InputError, match="give --overwrite"):
+        made.write(out, overwrite=False)
+    assert out.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda c, flap: c.update(wohler_exponents=[]), "without a channel or a Wöhler exponent"),
+        (lambda c, flap: c.update(channels={}), "without a channel"),
+        (lambda c, flap: flap.update(resampled=[]), f"{FLAP} has no resampled fits"),
+        (lambda c, flap: flap.update(winds=[9, 7]), f"{FLAP} has figures that no fit makes"),
+        (lambda c, flap: flap["resampled"][3][1].__setitem__(0, float("nan")), "figures that no fit makes"),
+        (lambda c, flap: flap.update(degree=7), f"{FLAP} has the degree 7"),
+        (lambda c, flap: flap.pop("winds"), "'winds'"),
+    ],
+)
+def test_a_calibration_that_no_fit_wrote_is_refused(made, tmp_path, change, said):
+    data = json.loads(to_checked(made.to_json()))
+    data.pop("crc32")
+    change(data, data["channels"][FLAP])
+    path = tmp_path / "richer.json"
+    path.write_bytes(to_checked(data))
+    with pytest.raises(InputError, match=rf"richer\.json is no calibration \(.*{said}"):
+        Calibration.read(path)
+
+
+def test_a_flipped_bit_in_a_calibration_is_noticed(made, tmp_path):
+    path = tmp_path / "richer.json"
+    made.write(path)
+    whole = path.read_bytes()
+    place = whole.index(b'"resampled"') + 60
+    place += next(i for i, sign in enumerate(whole[place:]) if sign in b"123456789")
+    path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+    with pytest.raises(InputError, match="its checksum is wrong"):
+        Calibration.read(path)
 
 
 @pytest.mark.parametrize(

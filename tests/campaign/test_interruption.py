@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 import tracemalloc
 from pathlib import Path
@@ -20,9 +21,12 @@ from fatigue_runner.campaign import bounds, run_campaign
 from fatigue_runner.campaign.block import Setup, run_block
 from fatigue_runner.campaign.plan import make_plan
 from fatigue_runner.campaign.store import Store
-from fatigue_runner.errors import InputError
+from fatigue_runner.errors import FatigueRunnerWarning, InputError
 from fatigue_runner.integrators import memory
+from fatigue_runner.report.rundata import load_run
+from fatigue_runner.report.sections import limits
 from fatigue_runner.results.records import to_line, whole_records
+from fatigue_runner.results.run_file import read_run_file, write_run_file
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -304,6 +308,45 @@ def test_a_damaged_run_json_is_told_and_deleting_it_mends(copy, text):
     assert json.loads((out / "run.json").read_text())["name"] == "kills"
 
 
+@pytest.mark.parametrize("what", ["turbine_hash", "nrmse_worst", "machine"])
+def test_a_flipped_bit_in_run_json_is_never_followed(copy, what):
+    """Identity, the answer that a run with nothing to do prints, and what the report says of the run."""
+    campaign, out = copy
+    whole = (out / "run.json").read_bytes()
+    place = whole.index(f'"{what}": '.encode()) + len(what) + 5
+    (out / "run.json").write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+    for look in (lambda: run_campaign(campaign, out, workers=1), lambda: load_run(out)):
+        with pytest.raises(InputError, match=r"run\.json is damaged; delete it"):
+            look()
+
+
+def test_a_damaged_table_or_journal_is_told_by_whoever_reads_it(copy):
+    campaign, out = copy
+    table = out / "results.csv"
+    whole = table.read_bytes()
+    place = whole.rindex(b".") + 1
+    table.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+    with pytest.warns(FatigueRunnerWarning, match=r"results\.csv is not what the run wrote"):
+        page = limits.build(load_run(out))
+    assert "is not what the run wrote" in str(page)
+    run_campaign(campaign, out, workers=1)
+    assert table.read_bytes() == whole
+    table.unlink()
+    journal = out / "cases.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join([lines[0].replace(b"done", b"donf"), *lines[1:]]))
+    with pytest.warns(FatigueRunnerWarning, match=r"1 records in .*cases\.jsonl are damaged and left out"):
+        load_run(out)
+
+
+def test_the_folder_s_copy_of_the_campaign_is_mended(copy):
+    campaign, out = copy
+    whole = (out / "campaign.yaml").read_bytes()
+    (out / "campaign.yaml").write_bytes(whole.replace(b"duration", b"durasion"))
+    assert run_campaign(campaign, out, workers=1).simulated == 0
+    assert (out / "campaign.yaml").read_bytes() == whole
+
+
 @pytest.mark.parametrize(
     "left", [["logs/"], ["logs/", "cases.jsonl"], ["logs/", "cases.jsonl", "run.json.part"]]
 )
@@ -341,11 +384,11 @@ def test_who_holds_the_lock_last_decides_whose_folder_it_is(copy):
     campaign, out = copy
     plan = make_plan(campaign)
     store = Store(out, plan.identity)
-    theirs = json.loads((out / "run.json").read_text()) | {"name": "another"}
-    (out / "run.json").write_text(json.dumps(theirs))  # between the check and the lock
+    theirs = read_run_file(out)
+    write_run_file(out, theirs | {"name": "another"})  # between the check and the lock
     with pytest.raises(InputError, match="belongs to another campaign"):
         store.open({}, "")
-    (out / "run.json").write_text(json.dumps(theirs | {"name": "kills"}))
+    write_run_file(out, theirs)
     Store(out, plan.identity).open({}, "")  # the lock was given back
 
 
@@ -460,6 +503,24 @@ def test_what_the_system_refuses_is_a_sentence_with_the_path(copy, monkeypatch, 
     assert len(run_campaign(campaign, out, workers=1)) == 20
 
 
+def test_a_full_disk_does_not_end_the_thread_that_looks_for_records(monkeypatch):
+    """A traceback of its own would stand beside the sentence."""
+    from fatigue_runner.campaign import pieces
+
+    told, looked = [], threading.Event()
+    monkeypatch.setattr(threading, "excepthook", told.append)
+    monkeypatch.setattr(pieces, "EVERY", 0.001)
+
+    def full():
+        if threading.current_thread() is not threading.main_thread():
+            looked.set()
+            raise OSError(28, "No space left on device")
+
+    with pieces.followed(full):
+        assert looked.wait(10)
+    assert told == []
+
+
 def test_a_folder_that_is_removed_meanwhile_is_a_sentence(finished, tmp_path, monkeypatch):
     import shutil
 
@@ -498,3 +559,27 @@ def test_a_corrector_that_is_damaged_meanwhile_fails_its_own_cases_only(tmp_path
     results = run_campaign(campaign, tmp_path / "out", workers=1)
     assert {row["method"]: row["status"] for row in results.rows} == {"heun": "done", "rk4": "failed"}
     assert "mine.safetensors" in results.lost[0]["error_message"]
+
+
+@pytest.mark.parametrize("how", ["changed", "gone"])
+def test_a_wind_file_that_is_another_meanwhile_fails_its_own_cases_only(tmp_path, monkeypatch, how):
+    """Its cases are those of the file that the campaign was made of: figures of another wind would stand under their name."""
+    from fatigue_runner.campaign import run
+
+    for name in ("one", "other"):
+        (tmp_path / f"{name}.csv").write_text("time,wind_speed\n0,8\n3,9\n6,8\n")
+    campaign = tmp_path / "c.yaml"
+    campaign.write_text(
+        "name: c\nduration: 5\nreference: none\nwind: {type: file, files: [one.csv, other.csv]}\n"
+        "integrators:\n  - {method: heun, step: 0.01}\n"
+    )
+    own = tmp_path / "one.csv"
+
+    def change(*_):
+        own.unlink() if how == "gone" else own.write_text("time,wind_speed\n0,8\n3,9.5\n6,8\n")
+
+    monkeypatch.setattr(run, "warm_up", change)
+    results = run_campaign(campaign, tmp_path / "out", workers=1)
+    failed = [row for row in results if row["status"] == "failed"]
+    assert len(failed) == 1 and "one.csv" in failed[0]["error_message"]
+    assert len([row for row in results if row["status"] == "done"]) == 1

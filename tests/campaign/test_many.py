@@ -26,6 +26,7 @@ from fatigue_runner.results.columns import table as columns_of
 from fatigue_runner.results.ranking import fatigue_columns
 from fatigue_runner.results.records import from_line, head_of, to_line
 from fatigue_runner.results.rows import Rows
+from fatigue_runner.results.run_file import read_run_file, write_run_file
 from fatigue_runner.results.table import Results, read_rows
 
 COLUMNS = columns_of(FATIGUE_CHANNELS, [3.0, 4.0, 5.0, 10.0, 12.0])
@@ -222,7 +223,7 @@ def test_another_program_makes_the_report_again(settled, counted, monkeypatch):
 @pytest.mark.parametrize("key", ["run.json", "answer", "record"])
 def test_what_is_not_as_it_was_is_looked_at_again(settled, counted, key):
     path, out, first = settled
-    told = json.loads((out / "run.json").read_text())
+    told = read_run_file(out)
     if key == "run.json":
         told["facts"]["machine"] = "another"
     elif key == "answer":
@@ -230,7 +231,7 @@ def test_what_is_not_as_it_was_is_looked_at_again(settled, counted, key):
     else:
         with (out / "cases.jsonl").open("ab") as journal:
             journal.write(b"half a rec")
-    (out / "run.json").write_text(json.dumps(told, indent=1))
+    write_run_file(out, told)
     again = run_campaign(path, out, workers=1)
     assert counted["prepared"] == 1 and counted["heads"] > 0
     assert again.rows == first.rows and again.simulated == 0

@@ -100,6 +100,31 @@ def test_a_damaged_header_or_weight_is_refused_with_what_is_wrong(tmp_path, chan
     assert "\n" not in str(caught.value)
 
 
+def test_a_flipped_bit_in_a_weight_is_noticed(tmp_path):
+    path = written(tmp_path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-2] + bytes([whole[-2] ^ 4]) + whole[-1:])
+    with pytest.raises(CorrectorError, match="is damaged: header and arrays are not those that were saved"):
+        load(path)
+
+
+def test_shipped_correctors_have_a_checksum():
+    from safetensors import safe_open
+
+    from fatigue_runner import shipped
+
+    for path in shipped.correctors().glob("*.safetensors"):
+        with safe_open(path, framework="numpy") as file:
+            assert "crc32" in file.metadata(), path
+
+
+def test_an_array_that_the_header_does_not_name_is_refused(tmp_path):
+    path = written(tmp_path)
+    rewritten(path, lambda h, t: t.update({"rung1.linear": np.zeros(2)}))
+    with pytest.raises(CorrectorError, match=r"the header does not name the arrays rung1\.linear"):
+        load(path)
+
+
 def test_a_guard_needs_an_absolute_tolerance_for_every_state():
     short = Guard(1.0, "max", 1.0, 1.0, (1.0,) * 15, (0.0,) * 16, 2)
     with pytest.raises(CorrectorError, match="its guard's atol needs a number for each of 16 states, got 15"):

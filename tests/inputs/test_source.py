@@ -52,7 +52,12 @@ def test_a_computed_mapping_becomes_plain_values():
         ("- 1\n", "a.yaml:1: a thing is a mapping of keys (a, b)"),
         ("a: [1\n", "a.yaml:2: not valid YAML"),
         ("a: 1\na: 2\n", "a.yaml:2: key 'a' is given twice"),
-        ("a: " + "[" * 500, "a.yaml: not a thing: its brackets nest too deeply"),
+        ("a: 1\nb: " + "[" * 500, "a.yaml:2: not a thing: its brackets nest too deeply"),
+        (
+            "a:\n" + "\n".join(" " * i + "a:" for i in range(1, 400)),
+            "a.yaml:400: not a thing: its values nest too deeply",
+        ),
+        ("a: 1\nb: x\x07y", "a.yaml:2: not valid YAML: the control character U+0007 stands there; remove it"),
     ],
 )
 def test_a_text_that_is_no_mapping_is_refused_as_what_it_should_be(text, message):

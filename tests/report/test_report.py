@@ -10,7 +10,7 @@ from html.parser import HTMLParser
 import pytest
 from report_example import CAMPAIGN, case_row, example_log, example_rows, write_run
 
-from fatigue_runner.errors import FatigueRunnerError, InputError
+from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning, InputError
 from fatigue_runner.report import rundata, sections, write_report
 from fatigue_runner.report.blocks import Column, Figure, Paragraph, Table, TableRow
 from fatigue_runner.report.rundata import load_run
@@ -238,7 +238,8 @@ def test_an_unreadable_log_leaves_out_its_curve_and_nothing_else(tmp_path, rows,
         raise FatigueRunnerError(f"{path} is cut off")
 
     monkeypatch.setattr(logbook, "read_log", refuse, raising=False)
-    assert "no readable logs" in section_text("histories", folder)
+    with pytest.warns(FatigueRunnerWarning, match="the page goes without a log: .* is cut off"):
+        assert "no readable logs" in section_text("histories", folder)
 
 
 def test_without_a_reference_the_report_says_so_and_draws_no_error(tmp_path):
@@ -274,8 +275,8 @@ def test_the_same_run_gives_the_same_bytes(folder, rows, logs):
         ("results.csv", "", "has no cases"),
         ("results.csv", "a,b\n1,2\n", "lacks the column 'case_id'"),
         ("results.csv", "case_id\n\udce9".encode("utf-8", "surrogateescape"), "save it as UTF-8"),
-        ("run.json", "{", "run.json cannot be read"),
-        ("run.json", "[]", "run.json cannot be read"),
+        ("run.json", "{", "run.json is damaged; delete it"),
+        ("run.json", "[]", "run.json is damaged; delete it"),
         ("campaign.yaml", "a: [", "campaign.yaml:1: not valid YAML"),
         ("campaign.yaml", "- 1", "campaign.yaml:1: a campaign is a mapping"),
     ],

@@ -18,6 +18,7 @@ SHORT = 600.0  # s; the length of a load case in IEC 61400-1
 def build(run: Run) -> Section | None:
     """The warnings of this run; None where there are none."""
     items = [
+        *run.changed,
         *_unfinished(run),
         *_operation(run),
         *pitch_rate_sentences(run.rows),

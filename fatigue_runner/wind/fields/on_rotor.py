@@ -47,9 +47,8 @@ def on_rotor(
 
     mean_speed, profile and box (`BOX_KEYS`) as in `FullFieldWind`. Raises InputError for what the readers and the projection refuse.
     """
-    files = files_of(Path(path))
     try:
-        stamps = tuple((str(p), p.stat().st_mtime_ns, p.stat().st_size) for p in files)
+        stamps = _stamps(Path(path))
     except OSError as error:
         raise InputError(
             f"{path}: cannot be read ({error.strerror}); check the path of the wind file"
@@ -59,9 +58,19 @@ def on_rotor(
 
 def content(path: Path) -> str:
     """Digest of all files that a wind file's wind depends on. Raises OSError where one cannot be read."""
+    return _content(_stamps(path))
+
+
+def _stamps(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """The files that a wind depends on, with time and size: as long as these are the same, nothing is read again."""
+    return tuple((str(p), p.stat().st_mtime_ns, p.stat().st_size) for p in files_of(path))
+
+
+@lru_cache(maxsize=64)
+def _content(stamps: tuple[tuple[str, int, int], ...]) -> str:
     sha = hashlib.sha256()
-    for file in files_of(path):
-        sha.update(file.read_bytes())
+    for file, *_ in stamps:
+        sha.update(Path(file).read_bytes())
     return sha.hexdigest()
 
 
