@@ -42,10 +42,11 @@ def exit_code_of(error: KeyboardInterrupt) -> int:
 
 
 @contextmanager
-def ended_by_signals() -> Iterator[None]:
+def ended_by_signals(to_the_end: bool = False) -> Iterator[None]:
     """Within it SIGTERM and SIGHUP end the run as Ctrl-C does; a second signal ends the process at once, without more words.
 
-    A signal that is ignored stays ignored (`nohup`). Outside the main thread it does nothing.
+    to_the_end: so does one that comes after it, while the process cleans up, which is worth neither words nor a traceback. A signal that
+    is ignored stays ignored (`nohup`). Outside the main thread it does nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -76,7 +77,8 @@ def ended_by_signals() -> Iterator[None]:
         yield
     finally:
         sys.unraisablehook = usual
-        for number in heard:
+        ended = to_the_end
+        for number in heard if not to_the_end else ():
             signal.signal(number, before[number])
 
 

@@ -87,6 +87,7 @@ def _system_error(error: OSError, folder: Path | None) -> str:
         errno.EROFS: "make it writable again, or choose another --out",
         errno.EACCES: "make it writable again, or choose another --out",
         errno.ENOENT: "the folder was removed while the campaign ran",
+        errno.EISDIR: "a folder stands where a file belongs; choose another --out",
         errno.EMFILE: "allow more open files (`ulimit -n`), or use fewer --workers",
     }
     way_out = helps.get(error.errno or 0, "see to it")

@@ -96,6 +96,23 @@ def without_times(table: Path) -> list[list[str]]:
     return [[row[i] for i in kept] for row in rows]
 
 
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_while_the_process_cleans_up_is_worth_no_words(number, code):
+    text = (
+        "import atexit, signal, time\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "atexit.register(lambda: (print('cleaning up', flush=True), time.sleep(60)))\n"
+        "from fatigue_runner.interruption import ended_by_signals\n"
+        "with ended_by_signals(to_the_end=True): pass\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", text], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline() == "cleaning up\n"
+        process.send_signal(number)
+        assert process.communicate(timeout=30)[1] == "" and process.returncode == code
+
+
 @pytest.mark.slow(reason="fifty runs that are killed, and as many that go on")
 def test_fifty_kills_cost_the_cases_under_way_and_no_figure(tmp_path):
     campaign = write(tmp_path)
