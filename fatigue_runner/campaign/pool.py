@@ -49,11 +49,20 @@ def run_jobs(
 
 def elsewhere(function: Callable[[J], T], job: J, workers: int) -> T:
     """`function(job)` in one of this machine's `workers`, so that what it loads does not stay in this process; what it warns of is told
-    here. Of one worker, which is this process, it is `beside`."""
+    here. Of one worker, which is this process, it is `beside`. A worker that is ended from outside is replaced once."""
     if workers <= 1:
         return beside(lambda: function(job))
     try:
-        ((result, said),) = _run_in_processes(_relayed, [(function, job, _folder())], workers, None)
+        try:
+            ((result, said),) = _relay(function, job, workers)
+        except WorkerEndedError as first:
+            warnings.warn(
+                f"{first}; what it was doing is tried once more", FatigueRunnerWarning, stacklevel=2
+            )
+            try:
+                ((result, said),) = _relay(function, job, workers)
+            except WorkerEndedError:
+                raise WorkerEndedError(f"{first}, and so did the one that tried it again") from None
     except KeyboardInterrupt:
         dismiss_workers()
         raise
@@ -62,6 +71,10 @@ def elsewhere(function: Callable[[J], T], job: J, workers: int) -> T:
             _told.add(sentence)
             warnings.warn(sentence, FatigueRunnerWarning, stacklevel=2)
     return result
+
+
+def _relay(function: Callable[[J], T], job: J, workers: int) -> Iterator[tuple[T, list[str]]]:
+    return _run_in_processes(_relayed, [(function, job, _folder())], workers, None)
 
 
 def _folder() -> str:

@@ -73,6 +73,10 @@ def run_campaign(
     folder = Path(out) if out is not None else None
     try:
         return _run_campaign(campaign, folder, workers, fresh, dask, console, watch, block)
+    except WorkerEndedError as error:  # before or after the cases
+        raise FatigueRunnerError(
+            f"{error}; what is finished is kept, the same command does the rest (with fewer --workers, which takes less memory)"
+        ) from None
     except OSError as error:
         raise FatigueRunnerError(_system_error(error, folder)) from error
 

@@ -17,7 +17,7 @@ from fatigue_runner.campaign.plan import make_plan
 from fatigue_runner.campaign.progress import _minutes
 from fatigue_runner.campaign.store import Store
 from fatigue_runner.channels import FATIGUE_CHANNELS
-from fatigue_runner.errors import FatigueRunnerError, InputError
+from fatigue_runner.errors import FatigueRunnerError, FatigueRunnerWarning, InputError
 from fatigue_runner.fatigue import damage_equivalent_load, short_term_cycles
 from fatigue_runner.logbook import read_log
 from fatigue_runner.results.columns import columns
@@ -639,7 +639,8 @@ def test_a_table_that_went_through_a_spreadsheet_is_the_same_table(world, tmp_pa
         )
     else:
         table.write_text("\n".join("\t".join(row) for row in rows), "utf-16")
-    assert read_results(folder) == before and len(before) == len(results)
+    with pytest.warns(FatigueRunnerWarning, match=r"results\.csv is not what the run wrote"):
+        assert read_results(folder) == before and len(before) == len(results)
 
 
 def is_number(cell):

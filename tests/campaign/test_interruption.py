@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from places import ROOT
 
-from fatigue_runner.campaign import bounds, run_campaign
+from fatigue_runner.campaign import bounds, pool, run_campaign
 from fatigue_runner.campaign.block import Setup, run_block
 from fatigue_runner.campaign.plan import make_plan
 from fatigue_runner.campaign.store import Store
@@ -253,6 +253,29 @@ def test_one_worker_that_is_killed_is_replaced(tmp_path):
     told = " ".join(told.split())
     assert "a worker process was ended from outside" in told and "tried once more" in told
     assert "600 cases, " in told
+
+
+def dies(marks):
+    """In a worker: ends it as often as there are marks."""
+    for mark in marks:
+        if mark.exists():
+            mark.unlink()
+            os._exit(9)
+    return "done"
+
+
+def test_a_worker_that_dies_before_or_after_the_cases_is_replaced_once(tmp_path):
+    marks = [tmp_path / name for name in "ab"]
+    marks[0].touch()
+    with pytest.warns(FatigueRunnerWarning, match="was ended from outside.* tried once more"):
+        assert pool.elsewhere(dies, marks, 2) == "done"
+    for mark in marks:
+        mark.touch()
+    with (
+        pytest.warns(FatigueRunnerWarning, match="tried once more"),
+        pytest.raises(pool.WorkerEndedError, match="and so did the one that tried it again"),
+    ):
+        pool.elsewhere(dies, marks, 2)
 
 
 # --- what was damaged meanwhile
