@@ -59,10 +59,10 @@ def make_logs(
             processes = workers or plan.campaign.workers
             jobs = plan.jobs_for_logs(missing, store, setup, processes)
             write_logs(store, jobs, run_block, processes, None, say)
+            if untouched:
+                store.settle(store.earlier.get(ANSWER))  # the results are what they were
         finally:
             store.close()
-        if untouched:
-            store.settle(store.earlier.get(ANSWER))  # the results are what they were
     return [store.log_path(name) for name in wanted]
 
 

@@ -126,16 +126,19 @@ def _run_campaign(
             pending = {case.wind.id for case in plan.cases if not plan.finished(store, case)}
             # where cases run in workers, what is big is not loaded here either
             helpers = processes if dask is None and len(pending) > 1 else 1
-            with nullcontext() if dask is None else Cluster(dask) as cluster:
-                simulated = _simulate(plan, store, processes, helpers, cluster, progress, watch, block)
-            settled = not simulated and store.settled
-            with stage("table"):
-                results = _collect(plan, store, simulated, settled)
-            if not settled:
-                store.unsettle()
-                _write(results, helpers, progress)
-            if not results.report_error:
-                _settle(results, plan, store)
+            try:  # the folder is this run's until its results are written
+                with nullcontext() if dask is None else Cluster(dask) as cluster:
+                    simulated = _simulate(plan, store, processes, helpers, cluster, progress, watch, block)
+                settled = not simulated and store.settled
+                with stage("table"):
+                    results = _collect(plan, store, simulated, settled)
+                if not settled:
+                    store.unsettle()
+                    _write(results, helpers, progress)
+                if not results.report_error:
+                    _settle(results, plan, store)
+            finally:
+                store.close()
     results.wall_time = time.perf_counter() - started
     return results
 
@@ -275,8 +278,6 @@ def _simulate(
         raise FatigueRunnerError(
             f"{error}; {_finished(plan, store)} are finished and kept, the same command runs the rest ({way_out})"
         ) from None
-    finally:
-        store.close()
 
 
 def _write_more_logs(

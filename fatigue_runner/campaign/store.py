@@ -145,7 +145,7 @@ class Store:
         return answer if known else None
 
     def settle(self, answer: dict[str, Any] | None) -> None:
-        """Remember what the results were made of and, where every case is finished, what they say. The store may be closed already."""
+        """Remember what the results were made of and, where every case is finished, what they say."""
         said = {} if answer is None else {ANSWER: answer}
         write_run_file(self.out, self._about | {MADE: self._made(self._about)} | said)
 
@@ -195,6 +195,7 @@ class Store:
             self._pieces.clear()
         elif not self._ends_with_a_line():
             self._journal.write(b"\n")  # what a crash cut off must not spoil the next record
+            self._journal.flush()
         self.take_in()  # what a run that was killed had finished of its blocks
         self._pieces.clear()
         write_atomically(self.out / "campaign.yaml", campaign_text.encode())

@@ -432,6 +432,24 @@ def test_who_holds_the_lock_last_decides_whose_folder_it_is(copy):
     Store(out, plan.identity).open({}, "")  # the lock was given back
 
 
+def test_the_folder_is_a_run_s_until_its_results_are_written(copy, monkeypatch):
+    """Else another one would write the same tables at the same time."""
+    from fatigue_runner.campaign import run
+
+    campaign, out = copy
+    (out / "results.csv").unlink()
+    plan, write_results = make_plan(campaign), run._write
+
+    def meanwhile(*given):
+        write_results(*given)
+        with pytest.raises(InputError, match="another run is writing here"):
+            Store(out, plan.identity).open({}, "")
+
+    monkeypatch.setattr(run, "_write", meanwhile)
+    assert run_campaign(campaign, out, workers=1).simulated == 0
+    Store(out, plan.identity).open({}, "")  # and is given back
+
+
 # --- what is too big, and what the system says
 
 
