@@ -67,6 +67,8 @@ class Corrector:
             raise CorrectorError(f"{what} must be at {self.step / steps * 1e3:g} ms")
         if (other.turbine_hash, other.operation) != (self.turbine_hash, self.binding.operation):
             raise CorrectorError(f"{what} is for another turbine")
+        if rung.map.commands != self.map.commands:
+            raise CorrectorError(f"{what} must see commands where the step above it does")
         if rung.rungs:
             raise CorrectorError(f"{what} has rungs of its own; list them all here")
         if reaches(rung.past, steps) > min(self.past, ENDS) - 1:

@@ -25,6 +25,7 @@ from fatigue_runner.corrector.coordinates import (
     turn_of,
 )
 from fatigue_runner.corrector.samples import places
+from fatigue_runner.integrators.command_rows import command_count, command_rows, commanded
 from fatigue_runner.integrators.linear_part import linearisation_point
 from fatigue_runner.layout import WIND
 
@@ -38,6 +39,9 @@ BEGINNING, BEGUN = (
     8,
     5.0,
 )  # one sample in so many lies in a run's first seconds [s], where the shaft still rings
+
+
+BENDING = 4  # with commands, one in so many lies where these bend most: corners are rare
 
 
 _ARRAYS = ("ahead_rows", "rows", "ahead", "plain", "exact", "speeds")
@@ -81,13 +85,14 @@ def collect(
     per_wind: int,
     seed: int,
     damping: float,
-    learned_ahead: Callable[[float], Array] | None,
+    learned_ahead: Sequence[Callable[[float], Array]] = (),
     bins: tuple[float, ...] = (),
     length: int = 1,
+    commands: bool = False,
 ) -> Steps:
     """Steps from random places of true trajectories `runs`, sampled every `step` [s], `length` of them in a row; learned_ahead: (states,
-    rows) part of the predictor for a mean wind [m/s], which may differ between the nearest of `bins`; damping [1/s]: see
-    `multi_blade.linear`."""
+    rows) part of the predictor for a mean wind [m/s], which may differ between the nearest of `bins`, then that of its second product;
+    damping [1/s]: see `multi_blade.linear`; commands: whether what is commanded within a step is seen."""
     rng = np.random.Generator(np.random.PCG64(seed))
     first = past + WARM
     picks = [
@@ -98,6 +103,9 @@ def collect(
         early = pick.reshape(-1, length)[::BEGINNING]
         last = min(first + round(BEGUN / step), len(run.time) - length)
         early[:] = rng.integers(first, last, len(early))[:, None] + np.arange(length)
+        if commands and length == 1:
+            bent = pick[BENDING // 2 :: BENDING]
+            bent[:] = first + most_bent(commanded(turbine, run.state[first - 1 :]), len(bent))
     kinds: dict[tuple[float, float], list[int]] = {}  # winds that share their matrices
     for i, w in enumerate(winds):
         nearest = min(bins, key=lambda b: abs(b - w.mean_speed), default=0.0)
@@ -106,9 +114,18 @@ def collect(
     parts = []
     for (point, nearest), here in kinds.items():
         found: Any = [[values[i] for i in here] for values in (winds, runs, picks)]
-        learned = None if learned_ahead is None else learned_ahead(nearest)
-        parts.append(_at(turbine, method, step, past, point, found, size, damping, learned))
+        learned = [of(nearest) for of in learned_ahead]
+        parts.append(_at(turbine, method, step, past, point, found, size, damping, learned, commands))
     return parts[0] if len(parts) == 1 else joined(parts)
+
+
+def most_bent(values: Array, count: int) -> Array:
+    """(count,) numbers n, all different as far as they go, of the steps from row n + 1 of values (rows, k) to the next that lie at the
+    largest changes of slope, each column in units of its usual one."""
+    bend = np.abs(np.diff(values, n=2, axis=0))
+    bend /= np.maximum(np.sqrt((bend**2).mean(axis=0)), 1e-300)
+    found = np.argsort(-bend.max(axis=1), kind="stable")[: max(1, min(count, len(bend) // 2))]
+    return np.resize(found, count)
 
 
 def joined(parts: Sequence[Steps]) -> Steps:
@@ -122,7 +139,7 @@ def joined(parts: Sequence[Steps]) -> Steps:
 
 def _at(
     turbine: Turbine, method: Any, step: float, past: int, point: float, found: list[Any], size: int, damping: float,
-    learned_ahead: Array | None,
+    learned_ahead: list[Array], commands: bool,
 ) -> Steps:  # fmt: skip
     """Those of the winds of one linearisation point; found: winds, runs, and places in them; size: rows of the wind that has most."""
     layout = turbine.layout
@@ -130,7 +147,12 @@ def _at(
     ahead_base, plain_base = method.matrices(
         turbine, step, 0.0, past, damping, point, size > len(layout.wind)
     )
-    ahead_all = ahead_base if learned_ahead is None else ahead_base + learned_ahead
+    ahead_all = ahead_base + learned_ahead[0] if learned_ahead else ahead_base
+    # the second product, which begins as the first
+    again_all = np.zeros((len(ahead_base), ahead_base.shape[1] + commands * command_count(past)))
+    again_all[:, : ahead_base.shape[1]] = ahead_all if len(learned_ahead) < 2 else ahead_base
+    if len(learned_ahead) > 1:
+        again_all += learned_ahead[1]
 
     def state(back: int) -> Array:
         return np.concatenate([run.state[pick - back] for run, pick in zip(runs, picks, strict=True)])
@@ -147,21 +169,29 @@ def _at(
     parts = [
         nonlinear_part(turbine, state(i), wind(i, 0.0), damping, point) for i in range(WARM, WARM + past)
     ]
+    made = [commanded(turbine, state(i)) for i in range(WARM, WARM + past)] if commands else []
     for back in range(WARM, -1, -1):
         x = state(back)
         pressure = np.stack([wind(back, place) for place in (0.0, 0.5, 1.0)], axis=1)
         turn = turn_of(layout, x)
         seen = rows(turbine, x, pressure, parts, turn, step)
-        change = from_fixed(layout, seen @ ahead_all.T, turn)
-        part = nonlinear_part(turbine, x + change, pressure[:, 2], damping, point)
+        there = x + from_fixed(layout, seen @ ahead_all.T, turn)
+        ahead_rows = seen
+        if commands and learned_ahead:
+            ahead_rows = np.concatenate([seen, command_rows(turbine, x, there, made, step)], axis=1)
+            there = x + from_fixed(layout, ahead_rows @ again_all.T, turn)
+        part = nonlinear_part(turbine, there, pressure[:, 2], damping, point)
         parts = [part, *parts]
+        whole = [seen, parts_to_fixed(layout, part, turn)]
+        if commands:
+            whole.append(command_rows(turbine, x, there, made, step))
+            made = [commanded(turbine, there), *made[:-1]]
         if back:
             parts = parts[:past]
-    whole = np.concatenate([seen, parts_to_fixed(layout, parts[0], turn)], axis=1)
     ahead = x + from_fixed(layout, seen @ ahead_base.T, turn)
-    plain = x + from_fixed(layout, whole @ plain_base.T, turn)
+    plain = x + from_fixed(layout, np.concatenate(whole[:2], axis=1) @ plain_base.T, turn)
     speeds = np.repeat([w.mean_speed for w in winds], [len(pick) for pick in picks])
-    return Steps(seen, whole, ahead, plain, state(-1), speeds, turn)
+    return Steps(ahead_rows, np.concatenate(whole, axis=1), ahead, plain, state(-1), speeds, turn)
 
 
 def rows(turbine: Turbine, x: Array, wind: Array, parts: list[Array], turn: Turn, step: float) -> Array:

@@ -117,7 +117,8 @@ STANDARD_FAMILY, STANDARD_TURBINE = "affine", "nrel5mw"
 
 def standard_recipes(turbine: Turbine | None = None) -> list[Path]:
     """The shipped recipes that are trained anew for every turbine, by name; without ladders, which are several trainings, those of another
-    loss, which have a twin, and those of a turbine that operates where this one has no controller."""
+    loss and those that see commands, which have a twin and take minutes, and those of a turbine that operates where this one has no
+    controller."""
     found = []
     for path in sorted(shipped.correctors().glob("*.yaml")):
         data = read_mapping(path, "recipe", "name, family, ...").data
@@ -126,6 +127,7 @@ def standard_recipes(turbine: Turbine | None = None) -> list[Path]:
             or data.get("turbine") != STANDARD_TURBINE
             or "ladder" in data
             or "loss" in data
+            or "commands" in data
         ):
             continue
         if turbine is None or turbine.control is not None or data.get("operation", FIXED) == FIXED:

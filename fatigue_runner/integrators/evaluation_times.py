@@ -55,14 +55,14 @@ class _Ready(NamedTuple):
     data: Any
 
 
-def learned(method: Any, model: Any, h: float, signals: Signals, ring: Ring) -> None:
+def learned(method: Any, model: Any, h: float, signals: Signals, data: Any, ring: Ring) -> None:
     """The learned part of one step from ring.current. Stub; see `choice`."""
     raise NotImplementedError("compiled code only")
 
 
 @compiled_for(learned, CorrectedArrays)
 @njit(**LEAN)
-def _of_stages(method: Any, model: Any, h: float, signals: Signals, ring: Ring) -> None:
+def _of_stages(method: Any, model: Any, h: float, signals: Signals, data: Any, ring: Ring) -> None:
     own = method.room
     _correction(
         method.learned, model, ring.current, ring.k, method.stage_rows, h, own.start, own.middle, signals.p, own.seen, own.hidden,
@@ -73,8 +73,8 @@ def _of_stages(method: Any, model: Any, h: float, signals: Signals, ring: Ring) 
 @compiled_for(learned, LadderArrays)
 @compiled_for(learned, ExponentialAdamsArrays)
 @njit(**LEAN)
-def _of_earlier_values(method: Any, model: Any, h: float, signals: Signals, ring: Ring) -> None:
-    learned_products(model, method, h, signals, ring)
+def _of_earlier_values(method: Any, model: Any, h: float, signals: Signals, data: Any, ring: Ring) -> None:
+    learned_products(model, method, h, signals, data, ring)
 
 
 @njit(**LEAN)
@@ -85,10 +85,12 @@ def _evaluate(repeats: int, model: Any, signals: Signals, ring: Ring, data: Any)
 
 
 @njit(**LEAN)
-def _correct(repeats: int, method: Any, model: Any, h: float, signals: Signals, ring: Ring) -> None:
+def _correct(
+    repeats: int, method: Any, model: Any, h: float, signals: Signals, data: Any, ring: Ring
+) -> None:
     for _ in range(repeats):
         ring.current[0] += 1e-12
-        learned(method, model, h, signals, ring)
+        learned(method, model, h, signals, data, ring)
 
 
 @njit(**LEAN)
@@ -137,7 +139,7 @@ def _of_correction(ensemble: Ensemble, integrator: Integrator) -> Pieces:
     groups = _groups(ensemble, integrator)
 
     def run(repeats: int, group: _Ready) -> None:
-        _correct(repeats, group.method, group.model, group.step, group.signals, group.ring)
+        _correct(repeats, group.method, group.model, group.step, group.signals, group.data, group.ring)
 
     return _pieces(run, groups)
 

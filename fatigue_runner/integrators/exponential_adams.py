@@ -125,9 +125,9 @@ class ExponentialAdams:
         points = [linearisation_point(turbine, speed) for speed in lanes.speeds]
         [low] = of_lanes(lambda p: [pack(multi_blade.linear(turbine, task.pitch, damping, p).low)[0]], points)
         factors = maps_at(points[0]).factors
-        ahead, weights, plain = of_lanes(lambda point: maps_at(point)[:-1], points)
-        maps = MultiBladeData(ahead, weights, plain, factors)
-        room = room_for(lanes.start, len(lanes.signals.p), layout, past, len(factors), aligned)
+        ahead, again, weights, plain = of_lanes(lambda point: maps_at(point)[:-1], points)
+        maps, steered = MultiBladeData(ahead, again, weights, plain, factors), len(again) > 0
+        room = room_for(lanes.start, len(lanes.signals.p), layout, past, len(factors), steered, aligned)
         tested = tested_by(corrector, hybrid, layout.size)
         return ExponentialAdamsArrays(
             low, turbine.gearbox_ratio, past, start.stages, start.result, STARTING, maps, tested, room

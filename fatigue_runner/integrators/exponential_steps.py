@@ -16,6 +16,13 @@ from numpy.typing import NDArray
 from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.integrators import multi_blade
 from fatigue_runner.integrators.choice import compiled_for
+from fatigue_runner.integrators.command_rows import (
+    CommandRoom,
+    command_count,
+    command_lines,
+    command_room,
+    keep_commands,
+)
 from fatigue_runner.integrators.contract import Aligned
 from fatigue_runner.integrators.dense import blocks_of, dense_rows, multiply, pack
 from fatigue_runner.integrators.guard import GuardUnits, guard, guard_units, norm_of
@@ -103,6 +110,7 @@ class Room(NamedTuple):
     k: Array
     stage: Array
     wind: Array
+    commands: CommandRoom
 
 
 class ExponentialAdamsArrays(NamedTuple):
@@ -125,13 +133,16 @@ def evaluations_of_refused(method: Any) -> NDArray[np.int64]:
 def plain_maps(ahead: Array, plain: Array) -> MultiBladeData:
     """Of the method alone."""
     corrector = pack(plain)[0]
-    return MultiBladeData(pack(ahead)[0], corrector, corrector, np.zeros(0, np.int64))
+    return MultiBladeData(pack(ahead)[0], np.zeros(0), corrector, corrector, np.zeros(0, np.int64))
 
 
-def room_for(start: Array, blown: int, layout: Any, past: int, factors: int, aligned: Aligned) -> Room:
+def room_for(
+    start: Array, blown: int, layout: Any, past: int, factors: int, steered: bool, aligned: Aligned
+) -> Room:
+    """steered: whether the map sees what is commanded within a step."""
     width, padded = len(start), 8 * blocks_of(layout.size) * LANES
     part = multi_blade.parts(layout)
-    inputs = multi_blade.base_rows(layout, past) * (1 + factors)
+    inputs = (multi_blade.base_rows(layout, past) + steered * command_count(past)) * (1 + factors)
     halves = 1 << (layout.size - 1).bit_length()
     zeros = {
         "ahead": padded, "fixed": padded, "other": padded, "change": padded,
@@ -148,6 +159,7 @@ def room_for(start: Array, blown: int, layout: Any, past: int, factors: int, ali
         refused=np.zeros(LANES, np.int64),
         states=aligned(np.zeros((3, width))),
         k=aligned(np.zeros((slope_rows(RK4), width))),
+        commands=command_room(layout, past + 1, steered, aligned),
     )
 
 
@@ -175,6 +187,15 @@ def times_linear(model, method, x):
     dense_rows(room.rel, method.low, relative_rows(model), part_size(model), room.product)
 
 
+@njit(**INLINE)
+def keep_part(model, method, x, slope, line, data):
+    """Line of the ring = nonlinear part, and what is commanded, in the state x, whose slope is known."""
+    room = method.room
+    times_linear(model, method, x)
+    nonlinear_part(model, slope, room.product, 1.0 / method.ratio, room.ring, line)
+    keep_commands(model, x, room.commands, line, data)
+
+
 @compiled_for(begin, ExponentialAdamsArrays)
 @njit(**INLINE)
 def begin_adams(method, model, h, signals, data, ring):
@@ -183,19 +204,20 @@ def begin_adams(method, model, h, signals, data, ring):
     copy_wind(model, signals.p, room.middle)
     rhs(model, ring.current, signals.p, signals.u, ring.slope, 0, data)
     keep(model, ring.slope, ring.k, 0)
-    times_linear(model, method, ring.current)
-    nonlinear_part(model, ring.slope, room.product, 1.0 / method.ratio, room.ring, 0)
+    keep_part(model, method, ring.current, ring.slope, 0, data)
 
 
 @compiled_for(recover, ExponentialAdamsArrays)
 @njit(**INLINE)
 def recover_adams(method):
     forget_infinite(method.room.ring)
+    forget_infinite(method.room.commands.at)
 
 
 @njit(**INLINE)
-def predict(model, method, h, newest, signals, ring):
-    """room.ahead = the predictor's result; room.seen = the rows that it sees."""
+def predict(model, method, h, newest, signals, data, ring):
+    """room.ahead = the predictor's result; room.seen = the rows that it sees. Where the map sees what is commanded within the step, the
+    first result says where the controller goes, and a second product sees that, too."""
     room, maps, past = method.room, method.maps, method.past
     seen, turned, current = room.seen, room.turned, ring.current
     first, wind, signal_count = first_past_row(model), first_wind_row(model), wind_signals(model)
@@ -214,10 +236,31 @@ def predict(model, method, h, newest, signals, ring):
     inputs = first + part_size(model) * past
     dense_rows(seen, maps.ahead, inputs, rows(model), room.change)
     advanced(model, current, room.change, turned, room.ahead)
+    if len(maps.again) > 0:
+        line = (newest + 1) % (past + 1)
+        keep_commands(model, room.ahead, room.commands, line, data)
+        command_lines(model, h, current, room.ahead, room.commands, past, line, seen, inputs, data)
+        dense_rows(seen, maps.again, inputs + command_count(past), rows(model), room.change)
+        advanced(model, current, room.change, turned, room.ahead)
 
 
 @njit(**INLINE)
-def correct(model, method, line, ring):
+def _learned(model, method, h, line, count, data, ring):
+    """room.change = what the learned corrector makes of its `count` rows, of what is commanded, and of its factors."""
+    room, maps = method.room, method.maps
+    every = count
+    if len(maps.again) > 0:
+        command_lines(
+            model, h, ring.current, room.ahead, room.commands, method.past, line, room.seen, count, data
+        )
+        every += command_count(method.past)
+    if len(maps.factors) > 0:
+        multiply(every, maps.factors, room.seen)
+    dense_rows(room.seen, maps.weights, every * (1 + len(maps.factors)), rows(model), room.change)
+
+
+@njit(**INLINE)
+def correct(model, method, h, line, data, ring):
     """ring.current = the corrector's result; in hybrid mode judged by that of the method as it is, and by the predictor's: what one step
     cannot follow, a corner of the equations or a wrong map, sets these two apart."""
     room, maps, tested = method.room, method.maps, method.tested
@@ -225,9 +268,7 @@ def correct(model, method, line, ring):
     new_row = first_past_row(model) + part_size(model) * method.past
     count = new_row + part_size(model)
     part_rows(model, room.ring, line, turned, seen, new_row)
-    if len(maps.factors) > 0:
-        multiply(count, maps.factors, seen)
-    dense_rows(seen, maps.weights, count * (1 + len(maps.factors)), rows(model), room.change)
+    _learned(model, method, h, line, count, data, ring)
     advanced(model, current, room.change, turned, room.fixed)
     if tested.hybrid:
         dense_rows(seen, maps.plain, count, rows(model), room.change)
@@ -246,16 +287,13 @@ def correct(model, method, line, ring):
 
 
 @njit(**INLINE)
-def learned_products(model, method, h, signals, ring):
+def learned_products(model, method, h, signals, data, ring):
     """What a step multiplies with learned matrices: the rows that it sees, predictor and corrector."""
-    room, maps = method.room, method.maps
-    predict(model, method, h, 0, signals, ring)
+    room = method.room
+    predict(model, method, h, 0, signals, data, ring)
     count = first_past_row(model) + part_size(model) * method.past
     part_rows(model, room.ring, 0, room.turned, room.seen, count)
-    count += part_size(model)
-    if len(maps.factors) > 0:
-        multiply(count, maps.factors, room.seen)
-    dense_rows(room.seen, maps.weights, count * (1 + len(maps.factors)), rows(model), room.change)
+    _learned(model, method, h, 0, count + part_size(model), data, ring)
 
 
 @njit(nogil=True, error_model="numpy", _nrt=False)
@@ -307,7 +345,7 @@ def advance_adams(method, model, n, h, now, new, signals, data, ring):
     small = method.substeps if n < past - 1 else 0  # steps of RK4 in this one; 0: predictor and corrector
     set_all(room.fine, small == 0)
     if small == 0:
-        predict(model, method, h, newest, signals, ring)
+        predict(model, method, h, newest, signals, data, ring)
     while True:
         if small > 0:
             inner = Signals(
@@ -321,11 +359,10 @@ def advance_adams(method, model, n, h, now, new, signals, data, ring):
             replace_refused(model, room.fine, room.fixed, ring.current)
             replace_refused(model, room.fine, room.fixed, room.ahead)
         rhs(model, room.ahead, signals.p, signals.u, ring.slope, 0, data)
-        times_linear(model, method, room.ahead)
-        nonlinear_part(model, ring.slope, room.product, 1.0 / method.ratio, room.ring, line)
+        keep_part(model, method, room.ahead, ring.slope, line, data)
         if small > 0:
             break
-        correct(model, method, line, ring)
+        correct(model, method, h, line, data, ring)
         if not method.tested.hybrid or _all_accepted(room):
             break
         if finer(method, model, n, h, now, line, signals, data, ring):

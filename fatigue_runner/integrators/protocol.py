@@ -49,10 +49,12 @@ class MultiBladeData(NamedTuple):
     """Predictor and corrector of an exponential Adams method on the rows of `multi_blade`, in multi-blade coordinates.
 
     ahead, weights: with their learned parts; plain: the corrector without, by which the hybrid judges; packed by `dense.pack`.
-    factors: rows that multiply all rows of the corrector.
+    again: where the map sees what is commanded within the step (`command_rows`), the predictor's second product, which sees that as well;
+    else empty. factors: rows that multiply all rows of the corrector.
     """
 
     ahead: Array
+    again: Array
     weights: Array
     plain: Array
     factors: Numbers

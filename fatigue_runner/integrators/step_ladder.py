@@ -29,13 +29,13 @@ from fatigue_runner.integrators.exponential_steps import (
     evaluations_of_refused,
     finer,
     finish_adams,
+    keep_part,
     note_adams,
     predict,
     recover_adams,
     set_all,
-    times_linear,
 )
-from fatigue_runner.integrators.multi_blade_rows import nonlinear_part, part_size
+from fatigue_runner.integrators.multi_blade_rows import part_size
 from fatigue_runner.integrators.output import PlanArrays, places_between
 from fatigue_runner.integrators.protocol import MultiBladeData
 from fatigue_runner.integrators.runge_kutta import Stages, Sum
@@ -139,6 +139,8 @@ def _take_over(model: Any, rung: Any, room: Any, ring: Any, line: int, newest: i
                 room.ahead[m] = own.ahead[m]
             for m in range(j, part_size(model) * LANES, LANES):
                 room.ring[line, m] = own.ring[newest, m]
+            for m in range(j, len(room.commands.made), LANES):
+                room.commands.at[line, m] = own.commands.at[newest, m]
             room.fine[j] = True
             room.refused[j] -= 1
     return whole
@@ -158,7 +160,10 @@ def _step_down(
     for i in range(past):
         # the newest stands in line `past`, so that none is negative
         if i % steps == 0:
-            _copy_part(model, top.ring, (n - i // steps) % (method.past + 1), room.ring, past - i)
+            before = (n - i // steps) % (method.past + 1)
+            _copy_part(model, top.ring, before, room.ring, past - i)
+            for m in range(len(room.commands.made)):
+                room.commands.at[past - i, m] = top.commands.at[before, m]
         else:
             write_output(model, i, rung.between, h, ring.states, ring.k, now, rung.states)
             copy_line(model, rung.states, i, room.stage)
@@ -168,8 +173,7 @@ def _step_down(
             else:
                 copy_wind(model, signals.p, room.wind)
             rhs(model, room.stage, room.wind, signals.u, inner.slope, 0, data)
-            times_linear(model, own, room.stage)
-            nonlinear_part(model, inner.slope, room.product, 1.0 / own.ratio, room.ring, past - i)
+            keep_part(model, own, room.stage, inner.slope, past - i, data)
     copy_line(model, ring.states, now, inner.current)
     copy_wind(model, top.start, room.start)
     copy_wind(model, top.middle, room.middle)
@@ -180,11 +184,10 @@ def _step_down(
             signals_at(model, (n + (s + 0.5) / steps) * h, signals)
             copy_wind(model, signals.p, room.middle)
             signals_at(model, (n + (s + 1) / steps) * h, signals)
-        predict(model, own, small, newest, signals, inner)
+        predict(model, own, small, newest, signals, data, inner)
         rhs(model, room.ahead, signals.p, signals.u, inner.slope, 0, data)
-        times_linear(model, own, room.ahead)
-        nonlinear_part(model, inner.slope, room.product, 1.0 / own.ratio, room.ring, line)
-        correct(model, own, line, inner)
+        keep_part(model, own, room.ahead, inner.slope, line, data)
+        correct(model, own, small, line, data, inner)
         copy_wind(model, signals.p, room.start)
     return (past + steps) % lines
 

@@ -30,6 +30,9 @@ from fatigue_runner.turbine.lane_code import LANES
 Array = NDArray[np.float64]
 
 
+COMMANDS = 2  # what a controller commands: pitch and generator torque
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """name: of the equations; generated: the module with `rhs`, `loads`, `constants`, `TABLES`, ...; layout: its states and signals.
@@ -167,6 +170,29 @@ def _loads_of_model(model, x, wind, control, out, start, data):
 def loads(model, x, wind, control, out, start, data):
     """out[start:] = load channels (k, LANES) of states, with the accelerations of the equations; else as `rhs`."""
     _loads(model, x, wind, control, out, start, data)
+
+
+def _commands(model, x, out, start, data):
+    raise NotImplementedError("compiled code only")
+
+
+@overload(_commands, inline="always")
+def _commands_of_model(model, x, out, start, data):
+    kernel = getattr(model.model.generated, "commands", None)
+    if kernel is None:
+        return lambda model, x, out, start, data: None
+
+    def call(model, x, out, start, data):
+        kernel(x, out, start, data.tables, data.cells, data.constants, data.clamped)
+
+    return call
+
+
+@njit(**INLINE)
+def commands(model, x, out, start, data):
+    """out[start:] = `COMMANDS` of LANES states, pitch [rad] and generator torque [N m], then the rates of the controller's states; nothing
+    where nobody steers."""
+    _commands(model, x, out, start, data)
 
 
 def _prefix(family: str) -> str:

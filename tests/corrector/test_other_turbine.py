@@ -33,7 +33,7 @@ def test_turbines_that_look_alike_are_told_apart_by_their_parameters():
 def test_the_standard_set_is_the_shipped_affine_recipes_of_the_real_turbine():
     names = [path.stem for path in standard_recipes()]
     assert "rk4-100ms" in names and "etdabm3-100ms" in names
-    assert not any("t2b1i1cg" in name or "paper" in name for name in names)
+    assert not any("t2b1i1cg" in name or "paper" in name or "commands" in name for name in names)
 
 
 def test_a_turbine_without_a_controller_has_no_standard_corrector_for_its_operation(tmp_path):

@@ -5,6 +5,7 @@ history            earlier nonlinear parts that the map sees, where that is more
 wind_bins          mean winds [m/s], a list or `{start, stop, count}`: a map for each, and a case takes the nearest one's; default one
                    map for all
 generator_damping  added to the linear part's [1/s] (default 0)
+commands           of a turbine under control: the map sees what its controller commands within the step as well (default false)
 guard              norm (`max`, `rms`), kappa (2), quantile (0.999; 1: the largest), rtol (0); compared with the method as it is
                    and with what was predicted; what is refused is made anew in substeps of RK4
 ladder             maps for smaller steps as well, which make what is refused before RK4 does: `halvings` (1: half the step; 2: a quarter,
@@ -45,6 +46,7 @@ from fatigue_runner.inputs.section import Section, problem
 from fatigue_runner.integrators import multi_blade
 from fatigue_runner.integrators.linear_part import linearisation_point
 from fatigue_runner.integrators.tableaux import RK4
+from fatigue_runner.turbine.turbine import FIXED
 
 if TYPE_CHECKING:
     from fatigue_runner.turbine import Turbine
@@ -73,6 +75,7 @@ class MultiBladeRecipe(ClosedForm):
     history: int = Field(default=0, ge=0, le=features.MOST_HISTORY)
     generator_damping: float = Field(default=0.0, ge=0, lt=MOST_DAMPING)
     wind_bins: Speeds | None = None
+    commands: bool = False
     guard: GuardRecipe = GuardRecipe()
     ladder: LadderRecipe | None = None
 
@@ -96,6 +99,19 @@ class MultiBladeRecipe(ClosedForm):
             return [what(np.arange(len(speeds)))]
         nearest = np.abs(speeds[:, None] - np.array(self.bins)).argmin(axis=1)
         return [what(np.flatnonzero(nearest == number)) for number in range(len(self.bins))]
+
+    def _in(self, weights: list[Array], speed: float) -> Array:
+        """Those of a mean wind's bin."""
+        return weights[place(self.bins, speed)]
+
+    @model_validator(mode="after")
+    def _commands_of_a_controller(self) -> MultiBladeRecipe:
+        if self.commands and self.operation == FIXED:
+            raise problem(
+                f"are those of a controller; add `operation: controlled`, or leave them out with `operation: {FIXED}`",
+                key="commands",
+            )
+        return self
 
     @model_validator(mode="after")
     def _bins_have_winds(self) -> MultiBladeRecipe:
@@ -162,24 +178,29 @@ class MultiBladeRecipe(ClosedForm):
                 found.speeds, lambda chosen: self.solve(layout, seen[chosen], turned[chosen], windows(chosen))
             )
 
-        def learned_ahead(speed: float) -> Array:
-            return ahead[place(self.bins, speed)]
-
-        progress.say(f"fitting the predictor to {len(winds) * self.samples} steps")
-        found = sampled(None, length=length)
-        ahead = fitted(found.ahead_rows, found.ahead_defect)
+        learned_ahead: list[Callable[[float], Array]] = []
+        predictors = []
+        for _ in range(1 + self.commands):
+            progress.say(f"fitting the predictor to {len(winds) * self.samples} steps")
+            bins = self.bins if learned_ahead else ()
+            found = sampled(learned_ahead, bins, length, self.commands)
+            ahead = fitted(found.ahead_rows, found.ahead_defect)
+            learned_ahead.append(partial(self._in, ahead))
+            predictors.append(ahead)
         progress.say("fitting the corrector")
-        found = sampled(learned_ahead, self.bins, length)
+        found = sampled(learned_ahead, self.bins, length, self.commands)
         seen = found.multiplied(features.multi_blade_factor_rows(layout, factors))
         learned = fitted(seen, found.defect)
         substeps = threshold.fallback_substeps(turbine, RK4.name, self.step, 1)
         speeds = np.concatenate([run.wind[:, 0] for run in runs])
         facts: dict[str, Any] = {"samples": len(seen), "winds": len(winds), "seed": self.seed}
         facts |= self.said_of_loss(length)
-        first, second = ((np.stack(w) if self.bins else w[0]) / binding.size for w in (ahead, learned))
-        matrices = MultiBladeMap(first, second, factors, self.history, damping, layout, self.bins)
+        first, *again, corrector = (
+            (np.stack(w) if self.bins else w[0]) / binding.size for w in (*predictors, learned)
+        )
+        matrices = MultiBladeMap(first, corrector, factors, self.history, damping, layout, self.bins, *again)
         if length > 1:  # for the threshold steps in a row are too few different ones
-            found = sampled(learned_ahead, self.bins)
+            found = sampled(learned_ahead, self.bins, commands=self.commands)
         guard = self._guard(matrices, binding.size, found, substeps)
         return Learned(matrices, guard, (float(speeds.min()), float(speeds.max())), facts)
 

@@ -84,6 +84,11 @@ class Map(ABC):
         return 0.0
 
     @property
+    def commands(self) -> bool:
+        """Whether it sees what a controller commands within a step."""
+        return False
+
+    @property
     def bins(self) -> tuple[float, ...]:
         """Mean winds [m/s] for each of which there is a map; none: one for all."""
         return ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,6 +13,7 @@ from fatigue_runner.corrector.coordinates import from_fixed
 from fatigue_runner.corrector.errors import CorrectorError
 from fatigue_runner.corrector.maps.map import Array, Map, Run
 from fatigue_runner.integrators import multi_blade
+from fatigue_runner.integrators.command_rows import command_count
 from fatigue_runner.integrators.linear_part import linearisation_point
 from fatigue_runner.integrators.protocol import MultiBladeData
 from fatigue_runner.layout import T2B1I1CG, Layout
@@ -33,7 +34,8 @@ class MultiBladeMap(Map):
     `factors`; (bins, states, k) where there is a map for each of several mean winds.
 
     `damping` [1/s] is added to the generator's in the method's linear part; `history`: earlier nonlinear parts that are seen, where
-    that is more than the method's own. layout: with azimuthal harmonics where they are seen.
+    that is more than the method's own. layout: with azimuthal harmonics where they are seen. again: of a map that sees what a
+    controller commands within the step (`integrators.command_rows`), the predictor's second product, on its rows and on these.
     """
 
     kind = features.MULTI_BLADE
@@ -46,6 +48,12 @@ class MultiBladeMap(Map):
     damping: float = 0.0
     layout: Layout = T2B1I1CG
     bins: tuple[float, ...] = ()
+    again: Array | None = None
+
+    @property
+    def commands(self) -> bool:
+        """Whether it sees what is commanded within a step."""
+        return self.again is not None
 
     @property
     def past(self) -> int:
@@ -65,15 +73,18 @@ class MultiBladeMap(Map):
                 f"one of an exponential method looks back {multi_blade.MOST_PAST} steps at most"
             )
         size, rows = self.layout.size, multi_blade.base_rows(self.layout, past_of(method, self.history))
+        if self.commands and not self.layout.first_order:
+            raise CorrectorError("it sees commands, and its turbine has no controller")
         first = (len(self.bins),) if self.bins else ()
-        wanted = (
-            (*first, size, rows - multi_blade.parts(self.layout)),
-            (*first, size, rows * (1 + len(self.factors))),
-        )
-        if (self.predictor.shape, self.linear.shape) != wanted:
+        ahead, more = rows - multi_blade.parts(self.layout), command_count(self.past) if self.commands else 0
+        found = [self.predictor.shape, self.linear.shape]
+        wanted = [(*first, size, ahead), (*first, size, (rows + more) * (1 + len(self.factors)))]
+        if self.again is not None:
+            found, wanted = [*found, self.again.shape], [*wanted, (*first, size, ahead + more)]
+        if found != wanted:
             raise CorrectorError(
-                f"weights of shape {self.predictor.shape} and {self.linear.shape} do not fit {method.name}'s "
-                f"features, which need {wanted[0]} and {wanted[1]}"
+                f"weights of shape {' and '.join(map(str, found))} do not fit {method.name}'s "
+                f"features, which need {' and '.join(map(str, wanted))}"
             )
 
     @property
@@ -94,16 +105,30 @@ class MultiBladeMap(Map):
         whole = binding.size * _seen(own[1], self.layout, layout, self.factors)
         whole[:, : plain.shape[1]] += plain
         learned_ahead = ahead + predictor
+        again = np.zeros(0)
+        if self.again is not None:
+            second = binding.size * _seen(self._in(self.again, run.speed), self.layout, layout, ())
+            second[:, : ahead.shape[1]] += ahead
+            again = pack(second)[0]
         rows = np.array(self._factor_rows, dtype=np.int64)
-        return MultiBladeData(pack(learned_ahead)[0], pack(whole)[0], pack(plain)[0], rows)
+        return MultiBladeData(pack(learned_ahead)[0], again, pack(whole)[0], pack(plain)[0], rows)
 
     def sample(
         self, binding: Binding, turbine: Turbine, winds: Sequence[Any], runs: Sequence[Trajectory], per_wind: int, seed: int
     ) -> steps.Steps:  # fmt: skip
         return steps.collect(
             turbine, binding.found, binding.step, self.past, winds, runs, per_wind, seed, self.damping,
-            lambda speed: self._in(self.predictor, speed) * binding.size, self.bins,
+            [self._learned(own, binding.size) for own in self._predictors], self.bins, commands=self.commands,
         )  # fmt: skip
+
+    def _learned(self, weights: Array, size: float) -> Callable[[float], Array]:
+        """Those of a mean wind, scaled to the defect."""
+        return lambda speed: self._in(weights, speed) * size
+
+    @property
+    def _predictors(self) -> list[Array]:
+        """In the order in which a step uses them."""
+        return [self.predictor] if self.again is None else [self.predictor, self.again]
 
     def predict(self, sampled: steps.Steps, size: float) -> Array:
         """Of the corrector; what the predictor adds is part of the plain results."""
@@ -111,7 +136,7 @@ class MultiBladeMap(Map):
 
     def predict_ahead(self, sampled: steps.Steps, size: float) -> Array:
         """(n, states) what the learned part adds to the predictor's result."""
-        return self._given(self.predictor, sampled.ahead_rows, sampled, size)
+        return self._given(self._predictors[-1], sampled.ahead_rows, sampled, size)
 
     def _given(self, weights: Array, seen: Array, sampled: steps.Steps, size: float) -> Array:
         out = np.empty(sampled.plain.shape)
@@ -125,7 +150,8 @@ class MultiBladeMap(Map):
         return weights[self.bin_of(speed)] if self.bins else weights
 
     def tensors(self) -> dict[str, Array]:
-        return {"predictor": self.predictor, "linear": self.linear}
+        again = {} if self.again is None else {"again": self.again}
+        return {"predictor": self.predictor, "linear": self.linear, **again}
 
     def header(self) -> dict[str, Any]:
         return {
@@ -137,12 +163,12 @@ class MultiBladeMap(Map):
     def read(cls, header: Mapping[str, Any], tensors: Mapping[str, Array], layout: Layout) -> Self:
         return cls(
             tensors["predictor"], tensors["linear"], tuple(header["factors"]), header["history"], header["damping"],
-            layout.extended(harmonics=header.get("harmonics", False)), tuple(header.get("bins", ())),
+            layout.extended(harmonics=header.get("harmonics", False)), tuple(header.get("bins", ())), tensors.get("again"),
         )  # fmt: skip
 
     @property
     def sees(self) -> str:
-        return self._sees_more(self.factors)
+        return self._sees_more(self.factors) + (", commands within the step" if self.commands else "")
 
 
 def _seen(weights: Array, own: Layout, run: Layout, factors: tuple[str, ...]) -> Array:

@@ -3400,3 +3400,65 @@ _loads: Any = lane_kernel(LOADS_CODE, ('x', 'wind', 'control', 'out'), LANES)
 def loads(x, wind, control, out, start, tables, cells, constants, clamped):
     """Load channels of LANES states: x (22, LANES), wind (5, LANES), control (0, LANES), out (k, LANES)."""
     _loads(x, wind, control, out, start, tables, cells, constants, clamped)
+
+
+COMMANDS_CODE = Code(place="", tables=(), width=0, text="""\
+ctl_ki = constants[91]
+speed_error_integral = x[21]
+u0 = ctl_ki*speed_error_integral
+filtered_generator_speed = x[20]
+u1 = -filtered_generator_speed
+ctl_kp = constants[90]
+ctl_rated = constants[89]
+u2 = ctl_kp*((-ctl_rated) - u1)
+ctl_gk = constants[92]
+ctl_u_blend = constants[94]
+u3 = (0.5)*ctl_gk*(sqrt(1.0 + (2.0*u0 + 2.0*u2 + 2.0*sqrt((ctl_u_blend*ctl_u_blend) + ((u0 + u2)*(u0 + u2))))/ctl_gk) - 1.0)
+ctl_fine = constants[93]
+c0 = ctl_fine + u3
+ctl_t_blend = constants[105]
+u4 = (ctl_t_blend*ctl_t_blend)
+ctl_k = constants[99]
+u9 = ctl_k*(filtered_generator_speed*filtered_generator_speed)
+ctl_cut_in = constants[97]
+u10 = (-ctl_cut_in) - u1
+ctl_s15 = constants[98]
+u11 = sqrt(u4 + ((ctl_s15*u10 - u9)*(ctl_s15*u10 - u9)))
+u12 = ctl_s15*u10
+u13 = sqrt(u4 + (((0.5)*u12 + (0.5)*u9 - (0.5)*u11)*((0.5)*u12 + (0.5)*u9 - (0.5)*u11)))
+ctl_s25 = constants[100]
+ctl_w25 = constants[101]
+u14 = ctl_s25*((-ctl_w25) - u1)
+u15 = sqrt(u4 + (((0.25)*u12 + (0.5)*u13 + (0.25)*u9 - u14 - (0.25)*u11)*((0.25)*u12 + (0.5)*u13 + (0.25)*u9 - u14 - (0.25)*u11)))
+u8 = (1.0/filtered_generator_speed)
+ctl_power = constants[102]
+u16 = ctl_power*u8
+ctl_torque = constants[103]
+u17 = sqrt(u4 + (((0.125)*u12 + (0.25)*u13 + (0.5)*u14 + (0.5)*u15 + (0.125)*u9 - ctl_torque - u16 - (0.125)*u11)*((0.125)*u12 + (0.25)*u13 + (0.5)*u14 + (0.5)*u15 + (0.125)*u9 - ctl_torque - u16 - (0.125)*u11)))
+u18 = (0.0625)*u12 + (0.125)*u13 + (0.25)*u14 + (0.25)*u15 + (0.0625)*u9 - (0.0625)*u11 - (0.5)*u17
+ctl_pitch_3 = constants[106]
+u5 = u3 - ctl_pitch_3
+ctl_pitch_blend = constants[107]
+u6 = (u5*u5)/(ctl_pitch_blend*ctl_pitch_blend)
+u7 = u6 + 1.0
+u19 = (0.5 + (0.25)*u5*(3.0 - u6/u7)/(ctl_pitch_blend*sqrt(u7)))*((0.5)*ctl_power*u8 + (0.5)*ctl_torque - u18)
+ctl_most = constants[104]
+c1 = (0.5)*ctl_most + (0.25)*ctl_torque + (0.03125)*u12 + (0.0625)*u13 + (0.125)*u14 + (0.125)*u15 + (0.25)*u16 + (0.5)*u19 + (0.03125)*u9 - (0.03125)*u11 - (0.25)*u17 - (0.5)*sqrt(u4 + ((u18 + u19 + (0.5)*ctl_torque + (0.5)*u16 - ctl_most)*(u18 + u19 + (0.5)*ctl_torque + (0.5)*u16 - ctl_most)))
+ctl_filter = constants[88]
+gend = x[19]
+c2 = ctl_filter*(gend - filtered_generator_speed)
+ctl_i_blend = constants[96]
+ctl_unwind = constants[95]
+c3 = filtered_generator_speed + ctl_unwind*((0.5)*sqrt((ctl_i_blend*ctl_i_blend) + (speed_error_integral*speed_error_integral)) - (0.5)*speed_error_integral) - ctl_rated
+out[0] = c0
+out[1] = c1
+out[2] = c2
+out[3] = c3
+""")
+_commands: Any = lane_kernel(COMMANDS_CODE, ("x", "out"), LANES)
+
+
+@njit(**INLINE)
+def commands(x, out, start, tables, cells, constants, clamped):
+    """Commanded pitch and generator torque in LANES states x, then the rates of the controller's states, in out[start:]."""
+    _commands(x, out, start, tables, cells, constants, clamped)
