@@ -9,12 +9,12 @@ Krogstad's stages in terms of f and of differences, so that only displacements w
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fatigue_runner.caches import kept_with
 from fatigue_runner.compiled import INLINE, LEAN, njit
 from fatigue_runner.integrators.choice import compiled_for
 from fatigue_runner.integrators.contract import Aligned, Lanes, Prepared, Task
@@ -77,7 +77,7 @@ ETDRK4 = ExponentialRungeKutta(
 )  # fmt: skip
 
 
-@lru_cache(maxsize=256)
+@kept_with(256)
 def matrices(turbine: Turbine, step: float, pitch: float, point: float = LINEARISED_AT) -> tuple[Array, ...]:
     """A at a linearisation point, then h/2 phi_1(hA/2), h phi_1(hA), h phi_2(hA/2), h phi_2(hA), h phi_3(hA), as `dense` reads them."""
     a = linear_part(turbine, pitch, point)

@@ -11,12 +11,12 @@ neighbours; lanes that share a point share the matrices (`dense.of_lanes`).
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fatigue_runner.caches import kept_with
 from fatigue_runner.errors import InputError
 from fatigue_runner.turbine.turbine import FIXED
 
@@ -38,7 +38,7 @@ def linearisation_point(turbine: Turbine, speed: float) -> float:
     return float(round(min(max(speed, OPERATED[0]), OPERATED[1])))
 
 
-@lru_cache(maxsize=64)
+@kept_with(64)
 def linear_part(turbine: Turbine, pitch: float, point: float = LINEARISED_AT) -> Array:
     """A (size, size) in the state's own coordinates for cases of a `linearisation_point`.
 
@@ -56,7 +56,7 @@ def linear_part(turbine: Turbine, pitch: float, point: float = LINEARISED_AT) ->
     return np.mean(found, axis=0) if found else _jacobian(turbine, LINEARISED_AT, pitch)
 
 
-@lru_cache(maxsize=128)
+@kept_with(128)
 def _jacobian(turbine: Turbine, wind: float, pitch: float) -> Array:
     """Of f about the operating point at one wind [m/s], averaged over the azimuth."""
     layout = turbine.layout

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fatigue_runner.caches import kept_with
 from fatigue_runner.integrators.linear_part import LINEARISED_AT, linear_part, phi_functions
 from fatigue_runner.layout import BLADES, Layout
 
@@ -96,7 +97,7 @@ class Linear:
     isotropic: Array
 
 
-@lru_cache(maxsize=64)
+@kept_with(64)
 def linear(turbine: Turbine, pitch: float, damping: float = 0.0, point: float = LINEARISED_AT) -> Linear:
     """The linear part at a linearisation point as it looks from every azimuth alike, to rounding: what the average leaves of a coupling
     is dropped.
@@ -162,7 +163,7 @@ def weights(a: Array, step: float, nodes: list[int]) -> list[Array]:
     return [sum(powers[k, j] * factorial(k) * step * phi[k + 1] for k in range(count)) for j in range(count)]
 
 
-@lru_cache(maxsize=256)
+@kept_with(256)
 def matrices(
     turbine: Turbine, step: float, pitch: float, nodes: tuple[int, int], past: int, damping: float = 0.0, point: float = LINEARISED_AT,
     harmonics: bool = False,

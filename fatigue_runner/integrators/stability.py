@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fatigue_runner.caches import kept_with
 from fatigue_runner.errors import InputError
 from fatigue_runner.integrators.ensemble import Ensemble, Integrator, simulate
 from fatigue_runner.integrators.methods import method as find_method
@@ -21,7 +21,7 @@ TRIED = 8  # runs
 LARGEST = 1.0  # s; no method of this program is used beyond
 
 
-@lru_cache(maxsize=256)
+@kept_with(256)
 def stability_limit(turbine: Turbine, method: str, wind: float | None = None, pitch: float = 0.0) -> float:
     """Largest step [s] for which no solution grows, |R(h lambda)| <= 1, in every mode of the turbine linearised at `wind` [m/s],
     8 where none is given; an exponential method, which has that motion exact, is tried out at `wind`, or at 8 and in the steep region

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fatigue_runner.caches import kept_with
 from fatigue_runner.control import Submodel
 from fatigue_runner.control.section import control_section
 from fatigue_runner.errors import InputError, did_you_mean
@@ -391,7 +392,7 @@ class Turbine:
         return natural_frequencies(self, wind, pitch)
 
 
-@lru_cache(maxsize=64)
+@kept_with(4)
 def _operated(turbine: Turbine, operation: str) -> Turbine:
     dynamics = UNCONTROLLED[turbine.family]
     if turbine.control is not None and operation != FIXED:
@@ -401,7 +402,7 @@ def _operated(turbine: Turbine, operation: str) -> Turbine:
     return replace(turbine, operation=operation, dynamics=dynamics)
 
 
-@lru_cache(maxsize=64)
+@kept_with(1)
 def _hash(turbine: Turbine) -> str:
     digest = hashlib.sha256()
     for name, value in sorted(turbine.parameters.items()):
@@ -430,35 +431,35 @@ def _data_of(turbine: Turbine, model: Model, pitch: float) -> KernelData:
     return _data_at_pitch(turbine, model, pitch)
 
 
-@lru_cache(maxsize=256)
+@kept_with(256)
 def _data_at_pitch(turbine: Turbine, model: Model, pitch: float) -> KernelData:
     from fatigue_runner.turbine.lanes import KernelData
 
-    kernel = model.generated
+    kernel, tables = model.generated, turbine.tables
     return KernelData(
         model=model,
         constants=kernel.constants(at_pitch(turbine.parameters, pitch)),
-        tables=turbine.tables.cells(pitch, kernel.TABLES[: kernel.EQUATION_TABLES]),
-        make_load_tables=lambda: turbine.tables.cells(pitch, kernel.TABLES),
-        cells=len(turbine.tables.tip_speed_ratio) - 1,
+        tables=tables.cells(pitch, kernel.TABLES[: kernel.EQUATION_TABLES]),
+        make_load_tables=lambda: tables.cells(pitch, kernel.TABLES),
+        cells=len(tables.tip_speed_ratio) - 1,
     )
 
 
-@lru_cache(maxsize=4)
+@kept_with(4)
 def _data_for_every_pitch(turbine: Turbine, model: Model) -> KernelData:
     from fatigue_runner.turbine.lanes import KernelData
 
-    kernel = model.generated
+    kernel, tables = model.generated, turbine.tables
     return KernelData(
         model=model,
         constants=kernel.constants({**turbine.parameters, **turbine.control_parameters}),
-        tables=_pitched_cells(turbine.tables, kernel.TABLES[: kernel.EQUATION_TABLES]),
-        make_load_tables=lambda: _pitched_cells(turbine.tables, kernel.TABLES),
-        cells=len(turbine.tables.tip_speed_ratio) - 1,
+        tables=_pitched_cells(tables, kernel.TABLES[: kernel.EQUATION_TABLES]),
+        make_load_tables=lambda: _pitched_cells(tables, kernel.TABLES),
+        cells=len(tables.tip_speed_ratio) - 1,
     )
 
 
-@lru_cache(maxsize=8)
+@kept_with(4)
 def _pitched_cells(tables: AeroTables, names: tuple[str, ...]) -> Array:
     """Made once for all modes of operation and gains of a turbine: seconds otherwise."""
     return tables.pitched_cells(names)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from simulating import simulate_block
 
+from fatigue_runner.caches import kept_with
 from fatigue_runner.errors import InputError
+from fatigue_runner.integrators import exponential_runge_kutta, multi_blade
+from fatigue_runner.integrators.stability import stability_limit
 from fatigue_runner.turbine import load_turbine, table_builder
 from fatigue_runner.turbine.file import read_turbine_file
 from fatigue_runner.turbine.parameters import DATA, at_pitch
@@ -187,6 +193,40 @@ def test_one_state_and_many_states_give_the_same_bits():
     many = turbine.rhs(x, 8.0, 0.1)
     for i in (0, 15, 16, 36):
         np.testing.assert_array_equal(turbine.rhs(x[:, i], 8.0, 0.1), many[:, i])
+
+
+def test_what_is_made_of_a_turbine_goes_with_the_last_who_holds_it():
+    turbine = load_turbine("nrel5mw")
+    operated = turbine.operated("controlled")
+    assert operated.kernel_data() is operated.kernel_data()
+    assert operated.tables is turbine.tables
+    assert len(operated.kernel_data().load_tables) > len(operated.kernel_data().tables)
+    seen = [
+        weakref.ref(made)
+        for made in (turbine, operated, turbine.tables, turbine.kernel_data(0.1), operated.kernel_data())
+    ]
+    assert turbine.hash != operated.hash
+    assert stability_limit(turbine, "rk4") > 0
+    multi_blade.matrices(turbine, 0.1, 0.0, (3, 2), 2)
+    exponential_runge_kutta.matrices(turbine, 0.1, 0.0)
+    del turbine, operated
+    gc.collect()
+    assert [made() for made in seen] == [None] * len(seen)
+
+
+def test_of_what_is_kept_with_an_object_the_oldest_goes_first():
+    made = []
+
+    @kept_with(2)
+    def product(of: type, first: int, second: int = 1) -> int:
+        made.append((first, second))
+        return first * second
+
+    calls = [(1,), (2,), (1,), (3,), (2,), (1,)]
+    assert [product(int, *call) for call in calls] == [1, 2, 1, 3, 2, 1]
+    assert made == [(1, 1), (2, 1), (3, 1), (1, 1)]
+    assert product(float, 1, second=5) == 5
+    assert len(made) == 5
 
 
 def test_the_hash_knows_parameters_tables_and_interpolation():
