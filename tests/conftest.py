@@ -66,9 +66,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         terminalreporter.write_line(f"peak memory of all processes: {watch.peak:.1f} GB")
         if watch.peak > _bound(config):
             terminalreporter.write_line(
-                f"FAILED: more than {_bound(config):g} GB: which kernels do tests compile that tests/kernels.py could?",
+                f"FAILED: more than {_bound(config):g} GB: which kernels do tests compile that tests/kernels.py could? Then there were",
                 red=True,
             )
+            for size, command in watch.processes[:8]:
+                terminalreporter.write_line(f"{size:6.2f} GB  {command[:120]}")
 
 
 def _bound(config: pytest.Config) -> float:

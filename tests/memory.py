@@ -11,10 +11,11 @@ EVERY = 2.0  # s: a sample takes some 20 ms a GB, and memory grows over minutes
 
 
 class Watch:
-    """Samples until it is stopped; `peak` [GB], 0 where the system does not tell (it does on Linux)."""
+    """Samples until it is stopped; `peak` [GB], 0 where the system does not tell (it does on Linux), and what each process had then."""
 
     def __init__(self, root: int | None = None) -> None:
         self.peak = 0.0
+        self.processes: list[tuple[float, str]] = []  # GB and command, the largest first
         self._root = os.getpid() if root is None else root
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._look, daemon=True)
@@ -27,7 +28,10 @@ class Watch:
 
     def _look(self) -> None:
         while not self._over.wait(EVERY):
-            self.peak = max(self.peak, sum(map(_proportional_set_size, tree(self._root))) / 1e9)
+            sizes = {process: _proportional_set_size(process) / 1e9 for process in tree(self._root)}
+            if sum(sizes.values()) > self.peak:
+                self.peak = sum(sizes.values())
+                self.processes = sorted(((size, _command(p)) for p, size in sizes.items()), reverse=True)
 
 
 def tree(root: int) -> list[int]:
@@ -44,6 +48,10 @@ def _proportional_set_size(process: int) -> int:
     """In bytes: what is shared counts in parts. 0 for a process that has ended."""
     lines = _text(Path(f"/proc/{process}/smaps_rollup")).splitlines()
     return 1024 * sum(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+
+
+def _command(process: int) -> str:
+    return _text(Path(f"/proc/{process}/cmdline")).replace("\0", " ").strip()
 
 
 def _text(path: Path) -> str:

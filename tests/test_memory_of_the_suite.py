@@ -28,6 +28,8 @@ def test_a_child_of_a_child_counts_and_what_has_ended_does_not(monkeypatch):
     assert len(memory.tree(parent.pid)) == 2
     parent.communicate(b"\n")
     assert 0.2 < watch.stop() < 0.4
+    (size, command), *_ = watch.processes
+    assert size > 0.2 and "block" in command
     after = memory.Watch(parent.pid)
     time.sleep(0.2)
     assert after.stop() == 0

@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from fatigue_runner.errors import InputError
 MAX_VALUES = 100_000
 MAX_DEPTH = 32
 _PLAIN = (bool, int, float, str, datetime.date, type(None))
+_PLAIN_KEYS = "a key is a name here, not a mapping or a list"
 _TAG = re.compile(r"(?:^|[\s\[{,:-])(![^\s,\]}]*)")
 # a quoted text or a comment, in which brackets mean nothing; else a bracket or the end of a line
 _BRACKETS = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'[^'\n]*'|(?<!\S)#[^\n]*|[\[\]{}\n]")
@@ -223,7 +225,9 @@ def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
 
     _refuse_endless(text, path, what)
     try:
-        data = YAML(typ="rt").load(_with_spaces(text, path))
+        reader = YAML(typ="rt")
+        reader.Constructor = _constructor()
+        data = reader.load(_with_spaces(text, path))
     except MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"{path}:{mark.line + 1}" if mark else str(path)
@@ -247,6 +251,23 @@ def parse_mapping(text: str, path: Path, what: str, keys: str) -> Source:
     if not isinstance(data, Mapping):
         raise InputError(f"{path}:1: a {what} is a mapping of keys ({keys})")
     return Source(str(path), data, text, path.absolute().parent, what)
+
+
+@cache
+def _constructor() -> type:
+    """The parser's own, but keys are plain values: one that is a mapping would be hashed, and of one in another in another for hours."""
+    from ruamel.yaml import RoundTripConstructor
+    from ruamel.yaml.constructor import ConstructorError
+    from ruamel.yaml.nodes import ScalarNode
+
+    class PlainKeys(RoundTripConstructor):
+        def construct_mapping(self, node: Any, maptyp: Any, deep: bool = False) -> Any:  # type: ignore[override]
+            for key, _ in node.value:
+                if not isinstance(key, ScalarNode):
+                    raise ConstructorError(None, None, _PLAIN_KEYS, key.start_mark)
+            return super().construct_mapping(node, maptyp, deep)
+
+    return PlainKeys
 
 
 def _refuse_endless(text: str, path: Path, what: str) -> None:
@@ -322,7 +343,7 @@ def _yaml_problem(error: Any) -> str:
         if key.isdigit():  # {start: 3,5, stop: 4,5}: twice a key 5
             return f"key {key!r} is given twice in one section; write numbers with a decimal point, not with a comma"
         return f"key {key!r} is given twice in one section; keep one of the two"
-    return f"not valid YAML: {problem}"
+    return problem if problem == _PLAIN_KEYS else f"not valid YAML: {problem}"
 
 
 def _nearby(path: Path) -> str:

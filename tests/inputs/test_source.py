@@ -58,6 +58,9 @@ def test_a_computed_mapping_becomes_plain_values():
             "a.yaml:400: not a thing: its values nest too deeply",
         ),
         ("a: 1\nb: x\x07y", "a.yaml:2: not valid YAML: the control character U+0007 stands there; remove it"),
+        ("a: 1\nb: " + "{" * 30 + "}" * 30, "a.yaml:2: a key is a name here, not a mapping or a list"),
+        ("a: [1, {? [b] : 1}]", "a.yaml:1: a key is a name here"),
+        ("a: &x {b: 1}\n*x : 2", "a.yaml:1: a key is a name here"),
     ],
 )
 def test_a_text_that_is_no_mapping_is_refused_as_what_it_should_be(text, message):
