@@ -63,6 +63,13 @@ def equation_parameters(data: Mapping[str, Any]) -> dict[str, float]:
         raise InputError(
             f"turbine {data.get('name', '?')}: the entry {missing} is missing; compare nrel5mw.yaml"
         ) from None
+    except (OverflowError, ZeroDivisionError):
+        values = {}
+    if not values or not all(map(isfinite, values.values())):
+        raise InputError(
+            f"turbine {data.get('name', '?')}: a value of blade, tower or drivetrain is far too large or too small for numbers to come "
+            "out; compare nrel5mw.yaml"
+        )
     return checked({k: float(v) for k, v in values.items()})
 
 

@@ -492,7 +492,11 @@ def load_turbine(source: str | Path | Mapping[str, Any]) -> Turbine:
             UNCONTROLLED[family],
             family=family,
         )
-    parameters = equation_parameters(data)
+    try:
+        with np.errstate(all="ignore"):  # what is no number is refused
+            parameters = equation_parameters(data)
+    except InputError as error:
+        raise error if isinstance(source, Mapping) else InputError(f"{source}: {error}") from None
     aero = data["aerodynamics"]
     path = Path(str(aero["tables"]))
     tables = read_tables(path, str(aero.get("interpolation", "cubic")))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import warnings
 import weakref
 
 import numpy as np
@@ -258,6 +259,20 @@ def test_an_impossible_turbine_is_refused_with_the_place(change, message):
     data = read_turbine_file("nrel5mw") | change
     with pytest.raises(InputError, match=message):
         load_turbine(data)
+
+
+@pytest.mark.parametrize(
+    "change", ["geometry: {tower_height: 1e200}", "blade: {mass_factor: 1e308}", "drivetrain: {gearbox_ratio: 1e308}"]
+)  # fmt: skip
+def test_numbers_that_are_beyond_computing_are_refused_with_the_file_and_no_warning(change, tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"base: nrel5mw\nname: mine\n{change}\n")
+    with warnings.catch_warnings(), pytest.raises(InputError) as caught:
+        warnings.simplefilter("error")
+        load_turbine(file)
+    assert str(caught.value).startswith(
+        f"{file}: turbine mine: a value of blade, tower or drivetrain is far too large"
+    )
 
 
 def test_tables_of_another_blade_are_refused_and_can_be_made_anew(tmp_path, monkeypatch):
