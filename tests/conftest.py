@@ -54,7 +54,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     watch = session.config.stash.get(MEMORY, None)
     if (
         watch is not None
-        and watch.stop() > _bound(session.config)
+        and watch.stop() > _scaled(session.config, memory.BOUND)
         and session.exitstatus == pytest.ExitCode.OK
     ):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
@@ -64,18 +64,19 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     watch = config.stash.get(MEMORY, None)
     if watch is not None and watch.peak:
         terminalreporter.write_line(f"peak memory of all processes: {watch.peak:.1f} GB")
-        if watch.peak > _bound(config):
-            terminalreporter.write_line(
-                f"FAILED: more than {_bound(config):g} GB: which kernels do tests compile that tests/kernels.py could? Then there were",
-                red=True,
-            )
+        if watch.peak > _scaled(config, memory.WANTED):
             for size, command in watch.processes[:8]:
                 terminalreporter.write_line(f"{size:6.2f} GB  {command[:120]}")
+        if watch.peak > _scaled(config, memory.BOUND):
+            terminalreporter.write_line(
+                f"FAILED: more than {_scaled(config, memory.BOUND):g} GB: which kernels do tests compile that tests/kernels.py could?",
+                red=True,
+            )
 
 
-def _bound(config: pytest.Config) -> float:
+def _scaled(config: pytest.Config, size: float) -> float:
     """[GB] for two processes, which CI has, or more in proportion."""
-    return memory.BOUND * max(2, config.option.numprocesses) / 2
+    return size * max(2, config.option.numprocesses) / 2
 
 
 @pytest.hookimpl(trylast=True)
