@@ -39,12 +39,14 @@ def kept_with(
         @wraps(function)
         def look_up(owner: Owner, /, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
             results, key = kept.setdefault(owner, {}), (args, *kwargs.items())
-            if key not in results:
+            try:
+                return results[key]
+            except KeyError:
                 made = function(owner, *args, **kwargs)
-                if len(results) >= most:
-                    del results[next(iter(results))]
-                results[key] = made
-            return results[key]
+            if len(results) >= most:
+                results.pop(next(iter(results)), None)  # another thread may have been faster
+            results[key] = made
+            return made
 
         return look_up
 
